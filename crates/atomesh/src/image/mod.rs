@@ -1,0 +1,80 @@
+//! Images: samples on a grid, and the frame that places the grid in the world.
+
+mod frame;
+mod samples;
+
+pub use frame::{Frame, FrameError, Grid, Units};
+pub use samples::{Range, Samples};
+
+/// Samples on a regular grid, with the frame that says where they are.
+///
+/// Sample `(i, j, k)` is at index `i + nx · (j + ny · k)`: x is the fastest axis, so a NumPy array
+/// of the same bytes has the shape `(nz, ny, nx)`.
+#[derive(Clone, Debug)]
+pub struct Image<const D: usize> {
+    frame: Frame<D>,
+    samples: Samples,
+}
+
+impl<const D: usize> Image<D> {
+    /// An image of `samples` placed by `frame`.
+    ///
+    /// # Errors
+    /// [`FrameError::SampleCount`] if there are not as many samples as the frame's shape says.
+    pub fn new(frame: Frame<D>, samples: Samples) -> Result<Self, FrameError> {
+        if samples.len() != frame.sample_count() {
+            return Err(FrameError::SampleCount {
+                expected: frame.sample_count(),
+                found: samples.len(),
+            });
+        }
+        Ok(Self { frame, samples })
+    }
+
+    /// Where the samples are.
+    pub fn frame(&self) -> &Frame<D> {
+        &self.frame
+    }
+
+    /// The same samples placed by another frame of the same shape.
+    ///
+    /// # Errors
+    /// [`FrameError::SampleCount`] if the shapes differ in their number of samples.
+    pub fn with_frame(self, frame: Frame<D>) -> Result<Self, FrameError> {
+        Self::new(frame, self.samples)
+    }
+
+    /// The sample values, x fastest.
+    pub fn samples(&self) -> &Samples {
+        &self.samples
+    }
+
+    /// The frame and the samples.
+    pub fn into_parts(self) -> (Frame<D>, Samples) {
+        (self.frame, self.samples)
+    }
+
+    /// The part of the image between samples `start` (included) and `end` (excluded).
+    ///
+    /// # Errors
+    /// [`FrameError::Crop`] if the range is empty or leaves the image.
+    pub fn crop(&self, start: [usize; D], end: [usize; D]) -> Result<Self, FrameError> {
+        let frame = self.frame.crop(start, end)?;
+        let shape = self.frame.shape();
+        let row = end[0] - start[0];
+        let samples = self.samples.gather(
+            frame.sample_count(),
+            (0..frame.sample_count() / row).map(|r| {
+                let (mut rest, mut index, mut stride) = (r, start[0], shape[0]);
+                for k in 1..D {
+                    let n = end[k] - start[k];
+                    index += (start[k] + rest % n) * stride;
+                    rest /= n;
+                    stride *= shape[k];
+                }
+                index..index + row
+            }),
+        );
+        Self::new(frame, samples)
+    }
+}

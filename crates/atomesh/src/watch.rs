@@ -1,0 +1,82 @@
+//! Progress out, cancel in.
+//!
+//! Long work calls [`Watch::step`] a few times a second or more; the answer says whether to go on.
+//! The core neither prints nor reads a clock: shells put words, bars and times to these calls.
+
+use std::ops::ControlFlow;
+
+/// What the work is busy with, in the order in which a run passes through.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash, PartialOrd, Ord)]
+#[non_exhaustive]
+pub enum Phase {
+    /// Reading an image.
+    Read,
+    /// Making the image potential b(x): features, smoothing, scaling.
+    Potential,
+    /// Making the nominal distance d(x) and limiting its gradient.
+    Distance,
+    /// Filling the box with atoms.
+    Grow,
+    /// Moving the atoms to lower the energy.
+    Optimize,
+    /// Connecting the atoms.
+    Connect,
+    /// Measuring the mesh.
+    Measure,
+    /// Drawing pictures.
+    Draw,
+    /// Writing files.
+    Write,
+}
+
+impl Phase {
+    /// A short lower-case name, for progress lines and reports.
+    pub fn name(self) -> &'static str {
+        match self {
+            Phase::Read => "read",
+            Phase::Potential => "potential",
+            Phase::Distance => "distance",
+            Phase::Grow => "grow",
+            Phase::Optimize => "optimize",
+            Phase::Connect => "connect",
+            Phase::Measure => "measure",
+            Phase::Draw => "draw",
+            Phase::Write => "write",
+        }
+    }
+}
+
+/// Listens to long work and may end it.
+pub trait Watch {
+    /// Called between iterations with the phase, the share of it done in 0..=1 and, where there is
+    /// one, the energy; `Break` ends the work early.
+    fn step(&mut self, phase: Phase, done: f64, energy: Option<f64>) -> ControlFlow<()>;
+}
+
+/// Listens to nothing and never ends the work.
+#[derive(Clone, Copy, Debug, Default)]
+pub struct Silent;
+
+impl Watch for Silent {
+    fn step(&mut self, _: Phase, _: f64, _: Option<f64>) -> ControlFlow<()> {
+        ControlFlow::Continue(())
+    }
+}
+
+/// The work was ended by its [`Watch`].
+#[derive(Clone, Copy, Debug, PartialEq, Eq, thiserror::Error)]
+#[error("cancelled")]
+pub struct Cancelled;
+
+/// [`Watch::step`] as a `Result`, so that `?` ends the work.
+pub fn check(
+    watch: &mut dyn Watch,
+    phase: Phase,
+    done: f64,
+    energy: Option<f64>,
+) -> Result<(), Cancelled> {
+    match watch.step(phase, done, energy) {
+        ControlFlow::Continue(()) => Ok(()),
+        ControlFlow::Break(()) => Err(Cancelled),
+    }
+}
