@@ -1,1 +1,90 @@
-//! (being built)
+//! Atoms that fill the image's box: crystals and how lattices grow from them, or are scattered.
+//!
+//! The boundary comes first (corners, then edges, then faces, then the interior), so that the mesh fills
+//! the box exactly: corners are fixed, atoms on an edge of the box keep one degree of freedom, on a face
+//! two. The paper lets the hull of the atoms be the boundary instead.
+
+mod crystal;
+mod grow;
+mod occupancy;
+
+pub use crystal::{Crystal, CrystalKind};
+pub use grow::{GrowOptions, LatticeError, grow};
+
+use crate::geometry::{Bounds, Point};
+
+/// Atoms in the box of an image, in lattice coordinates.
+#[derive(Clone, Debug)]
+pub struct Lattice<const D: usize> {
+    bounds: Bounds<D>,
+    atoms: Vec<Point<D>>,
+    /// Bit k of an atom: it may move along axis k.
+    freedom: Vec<u8>,
+    /// 0 = frozen … 1 = free, for each atom.
+    temperature: Vec<f32>,
+}
+
+impl<const D: usize> Lattice<D> {
+    /// A lattice without atoms.
+    pub(crate) fn empty(bounds: Bounds<D>) -> Self {
+        Self { bounds, atoms: Vec::new(), freedom: Vec::new(), temperature: Vec::new() }
+    }
+
+    pub(crate) fn push(&mut self, atom: Point<D>, freedom: u8, temperature: f32) {
+        self.atoms.push(atom);
+        self.freedom.push(freedom);
+        self.temperature.push(temperature);
+    }
+
+    /// The image's box.
+    pub fn bounds(&self) -> &Bounds<D> {
+        &self.bounds
+    }
+
+    /// The atoms' coordinates.
+    pub fn atoms(&self) -> &[Point<D>] {
+        &self.atoms
+    }
+
+    /// The number of atoms.
+    pub fn len(&self) -> usize {
+        self.atoms.len()
+    }
+
+    /// Whether there are no atoms.
+    pub fn is_empty(&self) -> bool {
+        self.atoms.is_empty()
+    }
+
+    /// How freely atom `i` moves along axis `k`: 0 where the box, or its temperature, holds it.
+    pub fn mobility(&self, i: usize, k: usize) -> f64 {
+        if self.freedom[i] >> k & 1 == 1 { f64::from(self.temperature[i]) } else { 0.0 }
+    }
+
+    /// Sets the temperature of atom `i`, 0 (frozen) to 1 (free): its variables are scaled by it, so
+    /// that the gradient stays a gradient (Hale 2002).
+    ///
+    /// # Panics
+    /// If there is no such atom or the temperature is outside 0…1.
+    pub fn set_temperature(&mut self, i: usize, temperature: f32) {
+        assert!((0.0..=1.0).contains(&temperature), "temperature {temperature}; expected 0 to 1");
+        self.temperature[i] = temperature;
+    }
+
+    /// The same lattice with its atoms elsewhere.
+    pub(crate) fn moved_to(mut self, atoms: Vec<Point<D>>) -> Self {
+        assert_eq!(atoms.len(), self.atoms.len());
+        self.atoms = atoms;
+        self
+    }
+
+    /// The same atoms in another order: entry `i` of the result is atom `order[i]`.
+    pub(crate) fn reordered(self, order: &[u32]) -> Self {
+        Self {
+            bounds: self.bounds,
+            atoms: order.iter().map(|&i| self.atoms[i as usize]).collect(),
+            freedom: order.iter().map(|&i| self.freedom[i as usize]).collect(),
+            temperature: order.iter().map(|&i| self.temperature[i as usize]).collect(),
+        }
+    }
+}

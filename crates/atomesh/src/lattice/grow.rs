@@ -1,0 +1,311 @@
+//! Growing a lattice outward from a seed (Hale 2001, algorithm 2), boundary first.
+//!
+//! Assumes d(x) is smooth, |∇d| ≪ 1. Corners, then edges of the box, divided evenly in ∫dx/d; then, in
+//! 3-D, its faces, grown as hexagonal crystals from their centres; then the interior from the seeds, or
+//! from the centre, as the wanted crystal. Visits atoms breadth first, tries their ideal neighbour sites
+//! in crystal order, and takes a site if the ball of diameter γ d around it is free. Coordinates are
+//! snapped to binary fractions, so that a perfect crystal stays perfect. Cost: O(atoms). Deterministic.
+
+use crate::distance::NominalDistance;
+use crate::geometry::{Bounds, Point};
+use crate::watch::{Cancelled, Phase, Watch, check};
+
+use super::crystal::Crystal;
+use super::occupancy::Occupancy;
+use super::Lattice;
+
+/// How a lattice is grown.
+#[derive(Clone, Debug, PartialEq)]
+pub struct GrowOptions<const D: usize> {
+    /// γ, the share of d that an atom keeps to itself. Default 0.8, the paper's.
+    pub spacing_factor: f64,
+    /// Atoms that stay where they are and from which the interior grows, in lattice coordinates: wells.
+    /// Default none: growth starts at the centre.
+    pub seed_points: Vec<Point<D>>,
+}
+
+impl<const D: usize> Default for GrowOptions<D> {
+    fn default() -> Self {
+        Self { spacing_factor: 0.8, seed_points: Vec::new() }
+    }
+}
+
+/// Why a lattice could not be made.
+#[derive(Clone, Debug, PartialEq, thiserror::Error)]
+#[non_exhaustive]
+pub enum LatticeError {
+    /// The box has no extent along an axis.
+    #[error("the image has 1 sample along {}; a mesh needs 2 or more along every axis", ["x", "y", "z"][*axis])]
+    Thin {
+        /// 0 for x, 1 for y, 2 for z.
+        axis: usize,
+    },
+    /// A seed point lies outside the box.
+    #[error("seed point {index} at {point:?} lies outside the box {min:?} to {max:?} (lattice coordinates)")]
+    SeedOutside {
+        /// The point's place in the list.
+        index: usize,
+        /// Its lattice coordinates.
+        point: Vec<f64>,
+        /// The box's least corner.
+        min: Vec<f64>,
+        /// The box's greatest corner.
+        max: Vec<f64>,
+    },
+    /// γ is not in 0.1…1.
+    #[error("spacing factor {value}; expected 0.1 to 1")]
+    SpacingFactor {
+        /// The factor given.
+        value: f64,
+    },
+    /// More atoms than indices can count.
+    #[error("more than {limit} atoms; choose a larger nominal distance")]
+    TooMany {
+        /// The greatest number of atoms.
+        limit: usize,
+    },
+    /// The caller ended the work.
+    #[error(transparent)]
+    Cancelled(#[from] Cancelled),
+}
+
+/// Atoms beyond which cells could not be counted in 32 bits.
+const ATOM_LIMIT: usize = 500_000_000;
+
+/// Grows a lattice that fills the box.
+///
+/// # Errors
+/// [`LatticeError`] if the box is thin, a seed lies outside, or the work was cancelled.
+pub fn grow<const D: usize>(
+    crystal: &Crystal<D>,
+    bounds: Bounds<D>,
+    distance: &NominalDistance<D>,
+    options: &GrowOptions<D>,
+    watch: &mut dyn Watch,
+) -> Result<Lattice<D>, LatticeError> {
+    let gamma = options.spacing_factor;
+    if !(0.1..=1.0).contains(&gamma) {
+        return Err(LatticeError::SpacingFactor { value: gamma });
+    }
+    let mut growth = Growth::new(crystal, bounds, distance, gamma)?;
+    growth.plant(&options.seed_points)?;
+    growth.edges();
+    for face in 0..if D == 3 { 6 } else { 0 } {
+        growth.face(face / 2, face % 2 == 1, watch)?;
+    }
+    growth.interior(crystal, options.seed_points.len(), watch)?;
+    Ok(growth.lattice)
+}
+
+struct Growth<'a, const D: usize> {
+    lattice: Lattice<D>,
+    occupancy: Occupancy<D>,
+    distance: &'a NominalDistance<D>,
+    gamma: f64,
+    /// Coordinates are multiples of this power of two.
+    quantum: f64,
+    expected: f64,
+}
+
+impl<'a, const D: usize> Growth<'a, D> {
+    fn new(
+        crystal: &Crystal<D>,
+        bounds: Bounds<D>,
+        distance: &'a NominalDistance<D>,
+        gamma: f64,
+    ) -> Result<Self, LatticeError> {
+        let extent = bounds.extent();
+        if let Some(axis) = (0..D).find(|&k| extent[k] <= 0.0) {
+            return Err(LatticeError::Thin { axis });
+        }
+        let expected = distance.estimated_atoms(crystal.density());
+        if expected > ATOM_LIMIT as f64 {
+            return Err(LatticeError::TooMany { limit: ATOM_LIMIT });
+        }
+        let (least, greatest) = (gamma * distance.least(), gamma * distance.greatest());
+        Ok(Self {
+            lattice: Lattice::empty(bounds),
+            occupancy: Occupancy::new(bounds, least, greatest, expected as usize),
+            distance,
+            gamma,
+            quantum: 2f64.powi(distance.least().log2().floor() as i32 - 16),
+            expected,
+        })
+    }
+
+    fn snap(&self, p: Point<D>) -> Point<D> {
+        p.map(|x| (x / self.quantum).round() * self.quantum)
+    }
+
+    fn add(&mut self, p: Point<D>, freedom: u8, temperature: f32) {
+        self.occupancy.take(p, self.gamma * self.distance.at(&p));
+        self.lattice.push(p, freedom, temperature);
+    }
+
+    fn is_free(&self, p: &Point<D>) -> bool {
+        self.occupancy.is_free(p, self.gamma * self.distance.at(p))
+    }
+
+    /// The user's fixed atoms.
+    fn plant(&mut self, seeds: &[Point<D>]) -> Result<(), LatticeError> {
+        let bounds = self.lattice.bounds;
+        for (index, p) in seeds.iter().enumerate() {
+            if !bounds.contains(p) {
+                return Err(LatticeError::SeedOutside {
+                    index,
+                    point: p.to_vec(),
+                    min: bounds.min.to_vec(),
+                    max: bounds.max.to_vec(),
+                });
+            }
+            if !self.lattice.atoms.contains(p) {
+                self.add(*p, 0, 0.0);
+            }
+        }
+        Ok(())
+    }
+
+    /// Corners, and atoms along every edge of the box at even steps of ∫dx/d.
+    fn edges(&mut self) {
+        let Bounds { min, max } = self.lattice.bounds;
+        let corner = |c: usize| -> Point<D> {
+            std::array::from_fn(|k| if c >> k & 1 == 1 { max[k] } else { min[k] })
+        };
+        for c in 0..1 << D {
+            if !self.lattice.atoms.contains(&corner(c)) {
+                self.add(corner(c), 0, 0.0);
+            }
+        }
+        for axis in 0..D {
+            for c in (0..1 << D).filter(|c| c >> axis & 1 == 0) {
+                for x in even_steps(&corner(c), axis, max[axis], self.distance) {
+                    let mut p = corner(c);
+                    p[axis] = (x / self.quantum).round() * self.quantum;
+                    if self.is_free(&p) {
+                        self.add(p, 1 << axis, 1.0);
+                    }
+                }
+            }
+        }
+    }
+
+    /// One face of the box in 3-D, where `normal` is at its least or greatest.
+    fn face(&mut self, normal: usize, far: bool, watch: &mut dyn Watch) -> Result<(), LatticeError> {
+        let axes: Vec<usize> = (0..D).filter(|&k| k != normal).collect();
+        let Bounds { min, max } = self.lattice.bounds;
+        let mut centre: Point<D> = std::array::from_fn(|k| 0.5 * (min[k] + max[k]));
+        centre = self.snap(centre);
+        centre[normal] = if far { max[normal] } else { min[normal] };
+        let steps: Vec<Point<D>> = Crystal::hexagonal()
+            .neighbors()
+            .iter()
+            .map(|v| {
+                let mut step = [0.0; D];
+                (step[axes[0]], step[axes[1]]) = (v[0], v[1]);
+                step
+            })
+            .collect();
+        let freedom = axes.iter().map(|k| 1u8 << k).sum();
+        let first = self.lattice.len();
+        if self.is_free(&centre) {
+            self.add(centre, freedom, 1.0);
+        }
+        self.spread(first, &steps, freedom, watch)
+    }
+
+    /// The inside of the box, from the first `seeds` atoms and the centre.
+    fn interior(
+        &mut self,
+        crystal: &Crystal<D>,
+        seeds: usize,
+        watch: &mut dyn Watch,
+    ) -> Result<(), LatticeError> {
+        let Bounds { min, max } = self.lattice.bounds;
+        let freedom = ((1usize << D) - 1) as u8;
+        let first = self.lattice.len();
+        for s in 0..seeds.min(first) {
+            self.surround(s, crystal.neighbors(), freedom);
+        }
+        if self.lattice.len() == first {
+            let centre = self.snap(std::array::from_fn(|k| 0.5 * (min[k] + max[k])));
+            if self.is_free(&centre) {
+                self.add(centre, freedom, 1.0);
+            }
+        }
+        self.spread(first, crystal.neighbors(), freedom, watch)
+    }
+
+    /// Algorithm 2's loop: the atoms from `first` on are the queue of those whose sites are still to be
+    /// tried, which visits sites in the same order as a queue of sites does.
+    fn spread(
+        &mut self,
+        first: usize,
+        steps: &[Point<D>],
+        freedom: u8,
+        watch: &mut dyn Watch,
+    ) -> Result<(), LatticeError> {
+        let mut at = first;
+        while at < self.lattice.len() {
+            if at % 4096 == 0 {
+                let done = (self.lattice.len() as f64 / self.expected.max(1.0)).min(1.0);
+                check(watch, Phase::Grow, done, None)?;
+            }
+            self.surround(at, steps, freedom);
+            at += 1;
+        }
+        Ok(())
+    }
+
+    /// Puts atoms on the free ideal sites around atom `i`.
+    fn surround(&mut self, i: usize, steps: &[Point<D>], freedom: u8) {
+        let Bounds { min, max } = self.lattice.bounds;
+        let from = self.lattice.atoms[i];
+        let d = self.distance.at(&from);
+        for step in steps {
+            let step = self.snap(step.map(|s| s * d));
+            let site: Point<D> = std::array::from_fn(|k| from[k] + step[k]);
+            let inside = (0..D).all(|k| {
+                if freedom >> k & 1 == 1 { min[k] < site[k] && site[k] < max[k] } else { true }
+            });
+            if inside && self.is_free(&site) {
+                self.add(site, freedom, 1.0);
+            }
+        }
+    }
+}
+
+/// Where a line from `start` along `axis` to `end` is divided evenly in ∫dx/d, ends left out.
+fn even_steps<const D: usize>(
+    start: &Point<D>,
+    axis: usize,
+    end: f64,
+    distance: &NominalDistance<D>,
+) -> Vec<f64> {
+    let length = end - start[axis];
+    // Simpson would do as well: d is smooth, and eight samples a nominal distance are plenty.
+    let count = ((length / distance.least() * 8.0).ceil() as usize).clamp(8, 1 << 22);
+    let h = length / count as f64;
+    let rate = |i: usize| {
+        let mut p = *start;
+        p[axis] += h * i as f64;
+        1.0 / distance.at(&p)
+    };
+    let mut total = Vec::with_capacity(count + 1);
+    total.push(0.0);
+    for i in 0..count {
+        total.push(total[i] + 0.5 * h * (rate(i) + rate(i + 1)));
+    }
+    let all = total[count];
+    let pieces = all.round().max(1.0) as usize;
+    let mut at = 0;
+    (1..pieces)
+        .map(|piece| {
+            let wanted = all * piece as f64 / pieces as f64;
+            while total[at + 1] < wanted {
+                at += 1;
+            }
+            let share = (wanted - total[at]) / (total[at + 1] - total[at]);
+            start[axis] + h * (at as f64 + share)
+        })
+        .collect()
+}

@@ -1,0 +1,299 @@
+//! L-BFGS by the two-loop recursion.
+
+use std::collections::VecDeque;
+
+use super::Objective;
+use super::blocks::{dot, update};
+use super::search::{State, Step};
+
+/// How [`Lbfgs`] works.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct LbfgsOptions {
+    /// How many past steps shape the direction, 1 or more. Default 8.
+    pub memory: usize,
+    /// Evaluations one line search may take, 1 or more. Default 20.
+    pub search_limit: usize,
+    /// The length of the first step, and of the first after a [`Lbfgs::restart`]: the greatest change
+    /// of a variable. Default 1.
+    pub first_move: f64,
+}
+
+impl Default for LbfgsOptions {
+    fn default() -> Self {
+        Self { memory: 8, search_limit: 20, first_move: 1.0 }
+    }
+}
+
+/// One past step: the move and the change of the gradient, in single precision to halve the memory;
+/// `curvature` is their inner product as stored, so that the recursion stays positive definite.
+#[derive(Clone, Debug)]
+struct Pair {
+    step: Vec<f32>,
+    change: Vec<f32>,
+    curvature: f64,
+}
+
+/// The limited-memory BFGS method, one iteration at a time.
+///
+/// Source: Byrd, Nocedal & Schnabel (1996), the two-loop recursion of page 17; the line search meets
+/// the weak Wolfe conditions. Allocates nothing once its memory is full.
+///
+/// ```
+/// use atomesh::minimize::{Lbfgs, LbfgsOptions, Objective, Step};
+/// struct Bowl;
+/// impl Objective for Bowl {
+///     fn evaluate(&mut self, x: &[f64], gradient: &mut [f64]) -> f64 {
+///         for (g, x) in gradient.iter_mut().zip(x) {
+///             *g = 2.0 * (x - 3.0);
+///         }
+///         x.iter().map(|x| (x - 3.0).powi(2)).sum()
+///     }
+/// }
+/// let mut minimizer = Lbfgs::new(vec![0.0; 4], LbfgsOptions::default());
+/// minimizer.restart(&mut Bowl);
+/// while minimizer.iterate(&mut Bowl) == Step::Lower {}
+/// assert!(minimizer.x().iter().all(|x| (x - 3.0).abs() < 1e-9));
+/// ```
+#[derive(Clone, Debug)]
+pub struct Lbfgs {
+    options: LbfgsOptions,
+    state: State,
+    direction: Vec<f64>,
+    history: VecDeque<Pair>,
+    spare: Vec<Pair>,
+}
+
+impl Lbfgs {
+    /// A minimizer that stands at `x`. Call [`Lbfgs::restart`] before the first iteration.
+    pub fn new(x: Vec<f64>, options: LbfgsOptions) -> Self {
+        let direction = vec![0.0; x.len()];
+        Self {
+            options,
+            state: State::new(x),
+            direction,
+            history: VecDeque::with_capacity(options.memory),
+            spare: Vec::new(),
+        }
+    }
+
+    /// Forgets past steps and evaluates the function anew, as is due when the function has changed.
+    pub fn restart(&mut self, objective: &mut impl Objective) {
+        self.spare.extend(self.history.drain(..));
+        self.state.evaluate(objective);
+    }
+
+    /// Where the minimizer stands.
+    pub fn x(&self) -> &[f64] {
+        &self.state.x
+    }
+
+    /// Puts the minimizer elsewhere; [`Lbfgs::restart`] must follow.
+    pub fn x_mut(&mut self) -> &mut [f64] {
+        &mut self.state.x
+    }
+
+    /// The value where it stands.
+    pub fn value(&self) -> f64 {
+        self.state.value
+    }
+
+    /// The gradient where it stands.
+    pub fn gradient(&self) -> &[f64] {
+        &self.state.gradient
+    }
+
+    /// How many times the function has been evaluated so far.
+    pub fn evaluations(&self) -> usize {
+        self.state.evaluations
+    }
+
+    /// One iteration: a direction, a line search, a step if the value falls.
+    pub fn iterate(&mut self, objective: &mut impl Objective) -> Step {
+        if !self.state.value.is_finite() {
+            return Step::NotFinite;
+        }
+        let step = self.advance(objective);
+        if step == Step::Stuck && !self.history.is_empty() {
+            // A direction shaped by stale curvature may lead nowhere; the gradient has the last word.
+            self.spare.extend(self.history.drain(..));
+            return self.advance(objective);
+        }
+        step
+    }
+
+    fn advance(&mut self, objective: &mut impl Objective) -> Step {
+        self.point_downhill();
+        let first = if self.history.is_empty() {
+            let steepest = self.direction.iter().fold(0.0f64, |m, p| m.max(p.abs()));
+            if steepest == 0.0 {
+                return Step::Stuck;
+            }
+            self.options.first_move / steepest
+        } else {
+            1.0
+        };
+        let limit = self.options.search_limit;
+        let (step, value) = self.state.search(objective, &self.direction, first, limit);
+        if step == Step::Lower {
+            self.remember();
+            self.state.accept(value);
+        }
+        step
+    }
+
+    /// Writes −H·gradient into `direction`, H being the inverse Hessian that the history implies.
+    fn point_downhill(&mut self) {
+        update(&mut self.direction, &self.state.gradient, |p, g| *p = -g);
+        let mut weights = Vec::with_capacity(self.history.len());
+        for pair in self.history.iter().rev() {
+            let a = dot(&pair.step, &self.direction) / pair.curvature;
+            update(&mut self.direction, &pair.change, |p, y| *p -= a * f64::from(y));
+            weights.push(a);
+        }
+        if let Some(last) = self.history.back() {
+            let scale = last.curvature / dot(&last.change, &last.change);
+            self.direction.iter_mut().for_each(|p| *p *= scale);
+        }
+        for (pair, a) in self.history.iter().zip(weights.into_iter().rev()) {
+            let b = dot(&pair.change, &self.direction) / pair.curvature;
+            update(&mut self.direction, &pair.step, |p, s| *p += (a - b) * f64::from(s));
+        }
+    }
+
+    /// Keeps the step from the current point to the trial, unless its curvature is not positive.
+    fn remember(&mut self) {
+        let n = self.state.x.len();
+        let full = self.history.len() >= self.options.memory.max(1);
+        let recycled = if full { self.history.pop_front() } else { self.spare.pop() };
+        let mut pair = recycled.unwrap_or_else(|| Pair {
+            step: vec![0.0; n],
+            change: vec![0.0; n],
+            curvature: 0.0,
+        });
+        let State { x, gradient, trial_x, trial_gradient, .. } = &self.state;
+        store_difference(&mut pair.step, trial_x, x);
+        store_difference(&mut pair.change, trial_gradient, gradient);
+        pair.curvature = dot(&pair.step, &pair.change);
+        let least = 1e-10 * dot(&pair.change, &pair.change).sqrt() * dot(&pair.step, &pair.step).sqrt();
+        if pair.curvature > least {
+            self.history.push_back(pair);
+        } else {
+            self.spare.push(pair);
+        }
+    }
+}
+
+/// `out = a − b`, taken in double precision and then rounded.
+fn store_difference(out: &mut [f32], a: &[f64], b: &[f64]) {
+    use rayon::prelude::*;
+    out.par_chunks_mut(8192).zip(a.par_chunks(8192).zip(b.par_chunks(8192))).for_each(
+        |(out, (a, b))| {
+            for (o, (a, b)) in out.iter_mut().zip(a.iter().zip(b)) {
+                *o = (a - b) as f32;
+            }
+        },
+    );
+}
+
+#[cfg(test)]
+mod tests {
+    use super::super::descend;
+    use super::*;
+
+    /// Σ 100 (x₂ₖ − x₂ₖ₋₁²)² + (1 − x₂ₖ₋₁)², whose minimum is 0 at all ones.
+    struct Rosenbrock;
+
+    impl Objective for Rosenbrock {
+        fn evaluate(&mut self, x: &[f64], gradient: &mut [f64]) -> f64 {
+            let mut value = 0.0;
+            for (x, g) in x.chunks_exact(2).zip(gradient.chunks_exact_mut(2)) {
+                let (a, b) = (1.0 - x[0], x[1] - x[0] * x[0]);
+                value += a * a + 100.0 * b * b;
+                g[0] = -2.0 * a - 400.0 * x[0] * b;
+                g[1] = 200.0 * b;
+            }
+            value
+        }
+    }
+
+    /// A bowl around 3 with walls: variables stay in 0…2, steps within 0.25.
+    struct Walled;
+
+    impl Objective for Walled {
+        fn evaluate(&mut self, x: &[f64], gradient: &mut [f64]) -> f64 {
+            let mut value = 0.0;
+            for (k, (x, g)) in x.iter().zip(gradient).enumerate() {
+                assert!((0.0..=2.0).contains(x), "asked for a value outside the walls: {x}");
+                let target = if k % 2 == 0 { 3.0 } else { 1.0 };
+                value += (x - target).powi(2);
+                *g = if *x >= 2.0 && target > 2.0 { 0.0 } else { 2.0 * (x - target) };
+            }
+            value
+        }
+        fn longest_step(&self, direction: &[f64]) -> f64 {
+            0.25 / direction.iter().fold(1e-300f64, |m, p| m.max(p.abs()))
+        }
+        fn confine(&self, x: &mut [f64]) {
+            x.iter_mut().for_each(|x| *x = x.clamp(0.0, 2.0));
+        }
+    }
+
+    fn run(objective: &mut impl Objective, x: Vec<f64>, limit: usize) -> Lbfgs {
+        let mut minimizer = Lbfgs::new(x, LbfgsOptions::default());
+        minimizer.restart(objective);
+        for _ in 0..limit {
+            if minimizer.iterate(objective) != Step::Lower {
+                break;
+            }
+        }
+        minimizer
+    }
+
+    #[test]
+    fn finds_the_bottom_of_a_curved_valley() {
+        let start: Vec<f64> = (0..2000).map(|k| if k % 2 == 0 { -1.2 } else { 1.0 }).collect();
+        let minimizer = run(&mut Rosenbrock, start, 200);
+        // A second-order method ends where rounding of the value, about 1e-16 of 1, hides the slope.
+        assert!(minimizer.x().iter().all(|x| (x - 1.0).abs() < 1e-5), "{}", minimizer.value());
+        assert!(minimizer.evaluations() < 150, "{} evaluations", minimizer.evaluations());
+    }
+
+    #[test]
+    fn beats_plain_descent_to_the_same_answer() {
+        let start: Vec<f64> = (0..40).map(|k| f64::from(k % 7)).collect();
+        let mut slow = start.clone();
+        for _ in 0..200 {
+            descend(&mut Walled, &mut slow, 0.1);
+        }
+        let fast = run(&mut Walled, start, 50);
+        for (a, b) in fast.x().iter().zip(&slow) {
+            // a step of 0.1 gradients contracts by 0.8: 0.8²⁰⁰ = 4e-20 of the start is left
+            assert!((a - b).abs() < 1e-6, "{a} {b}");
+        }
+    }
+
+    #[test]
+    fn steps_stay_within_the_longest() {
+        let mut objective = Walled;
+        let mut minimizer = Lbfgs::new(vec![0.5; 10], LbfgsOptions::default());
+        minimizer.restart(&mut objective);
+        let before = minimizer.x().to_vec();
+        assert_eq!(minimizer.iterate(&mut objective), Step::Lower);
+        let moved = minimizer.x().iter().zip(&before).map(|(a, b)| (a - b).abs());
+        assert!(moved.fold(0.0, f64::max) <= 0.25 + 1e-15);
+    }
+
+    #[test]
+    fn a_value_that_is_not_finite_ends_the_work() {
+        struct Broken;
+        impl Objective for Broken {
+            fn evaluate(&mut self, x: &[f64], gradient: &mut [f64]) -> f64 {
+                gradient.fill(1.0);
+                if x[0] < 0.0 { f64::NAN } else { x[0] }
+            }
+        }
+        let mut minimizer = Lbfgs::new(vec![0.5; 3], LbfgsOptions::default());
+        minimizer.restart(&mut Broken);
+        assert_eq!(minimizer.iterate(&mut Broken), Step::NotFinite);
+    }
+}

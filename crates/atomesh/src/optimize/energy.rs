@@ -1,0 +1,154 @@
+//! The lattice's energy as a function of free variables.
+
+use rayon::prelude::*;
+
+use crate::geometry::{Bounds, Point};
+use crate::lattice::Lattice;
+use crate::minimize::Objective;
+use crate::potential::{Energy, Engine};
+
+/// An [`Objective`] whose variables are the atoms' coordinates.
+///
+/// What the box or a temperature of 0 holds has gradient 0 and so never moves. A temperature T between
+/// scales its variables: with x = x₀ + T (z − x₀) the gradient by z is T times that by x.
+pub(super) struct LatticeEnergy<E, const D: usize> {
+    lattice: Lattice<D>,
+    engine: E,
+    margin: f64,
+    longest_move: f64,
+    /// dx/dz of each variable, 0…1.
+    mobility: Vec<f32>,
+    /// Whether some mobility is neither 0 nor 1, so that x differs from z.
+    tempered: bool,
+    /// The atoms at x, where that differs from the variables.
+    atoms: Vec<Point<D>>,
+}
+
+impl<E: Engine<D>, const D: usize> LatticeEnergy<E, D> {
+    pub fn new(lattice: Lattice<D>, mut engine: E, margin: f64, longest_move: f64) -> Self {
+        let mobility: Vec<f32> = (0..lattice.len() * D)
+            .map(|v| lattice.mobility(v / D, v % D) as f32)
+            .collect();
+        engine.prepare(lattice.atoms(), longest_move);
+        let tempered = mobility.iter().any(|&m| m != 0.0 && m != 1.0);
+        Self { lattice, engine, margin, longest_move, mobility, tempered, atoms: Vec::new() }
+    }
+
+    /// The variables of the lattice as it was given.
+    pub fn start(&mut self) -> Vec<f64> {
+        self.lattice.atoms().as_flattened().to_vec()
+    }
+
+    pub fn distances(&self) -> &[f64] {
+        self.engine.distances()
+    }
+
+    pub fn least_distance(&self) -> f64 {
+        self.distances().iter().copied().fold(f64::INFINITY, f64::min)
+    }
+
+    /// Puts back every variable that may not move.
+    pub fn hold(&self, z: &mut [f64]) {
+        let start = self.lattice.atoms().as_flattened();
+        for ((z, &x), &m) in z.iter_mut().zip(start).zip(&self.mobility) {
+            if m == 0.0 {
+                *z = x;
+            }
+        }
+    }
+
+    /// Readies the engine between iterations; says whether the energy has become another function.
+    pub fn prepare(&mut self, z: &[f64]) -> bool {
+        self.temper(z);
+        let atoms = if self.tempered { &self.atoms[..] } else { z.as_chunks::<D>().0 };
+        self.engine.prepare(atoms, self.longest_move)
+    }
+
+    /// The energy at `z`, for the report.
+    pub fn evaluate_at(&mut self, z: &[f64]) -> Energy {
+        let mut gradient = vec![[0.0; D]; z.len() / D];
+        self.prepare(z);
+        let atoms = if self.tempered { &self.atoms[..] } else { z.as_chunks::<D>().0 };
+        self.engine.evaluate(atoms, &mut gradient)
+    }
+
+    /// The lattice with its atoms at `z`.
+    pub fn into_lattice(mut self, z: &[f64]) -> Lattice<D> {
+        self.temper(z);
+        let atoms = if self.tempered { self.atoms } else { z.as_chunks::<D>().0.to_vec() };
+        self.lattice.moved_to(atoms)
+    }
+
+    fn temper(&mut self, z: &[f64]) {
+        if !self.tempered {
+            return;
+        }
+        self.atoms.resize(z.len() / D, [0.0; D]);
+        let start = self.lattice.atoms().as_flattened();
+        let x = self.atoms.as_flattened_mut();
+        for v in 0..z.len() {
+            x[v] = start[v] + f64::from(self.mobility[v]) * (z[v] - start[v]);
+        }
+    }
+
+    /// The part of the box that an atom of nominal distance `d` may be in.
+    fn room(&self, d: f64) -> Bounds<D> {
+        let Bounds { min, max } = *self.lattice.bounds();
+        let inset = |k: usize| (self.margin * d).min(0.5 * (max[k] - min[k]));
+        Bounds {
+            min: std::array::from_fn(|k| min[k] + inset(k)),
+            max: std::array::from_fn(|k| (max[k] - inset(k)).max(min[k] + inset(k))),
+        }
+    }
+}
+
+/// Atoms that one thread works on at a time.
+const CHUNK: usize = 2048;
+
+impl<E: Engine<D>, const D: usize> Objective for LatticeEnergy<E, D> {
+    fn evaluate(&mut self, z: &[f64], gradient: &mut [f64]) -> f64 {
+        self.temper(z);
+        let atoms = if self.tempered { &self.atoms[..] } else { z.as_chunks::<D>().0 };
+        let slopes = gradient.as_chunks_mut::<D>().0;
+        let energy = self.engine.evaluate(atoms, slopes);
+        let (z, mobility) = (z.as_chunks::<D>().0, self.mobility.as_chunks::<D>().0);
+        let distances = self.engine.distances();
+        let this = &*self;
+        slopes.par_iter_mut().enumerate().with_min_len(CHUNK).for_each(|(i, slope)| {
+            let room = this.room(distances[i]);
+            for k in 0..D {
+                let outward = (z[i][k] <= room.min[k] && slope[k] > 0.0)
+                    || (z[i][k] >= room.max[k] && slope[k] < 0.0);
+                slope[k] = if outward { 0.0 } else { slope[k] * f64::from(mobility[i][k]) };
+            }
+        });
+        energy.total()
+    }
+
+    fn longest_step(&self, direction: &[f64]) -> f64 {
+        let greatest = direction
+            .as_chunks::<D>()
+            .0
+            .par_iter()
+            .zip(self.distances())
+            .with_min_len(CHUNK)
+            .map(|(p, d)| p.iter().map(|x| x * x).sum::<f64>() / (d * d))
+            .reduce(|| 0.0, f64::max); // a maximum is the same in any order
+        if greatest > 0.0 { self.longest_move / greatest.sqrt() } else { f64::INFINITY }
+    }
+
+    fn confine(&self, z: &mut [f64]) {
+        let mobility = self.mobility.as_chunks::<D>().0;
+        let distances = self.distances();
+        z.as_chunks_mut::<D>().0.par_iter_mut().enumerate().with_min_len(CHUNK).for_each(
+            |(i, atom)| {
+                let room = self.room(distances[i]);
+                for k in 0..D {
+                    if mobility[i][k] > 0.0 {
+                        atom[k] = atom[k].clamp(room.min[k], room.max[k]);
+                    }
+                }
+            },
+        );
+    }
+}

@@ -1,0 +1,116 @@
+//! What every engine promises, and the double sum that they are checked against.
+
+use crate::geometry::{Point, difference, dot};
+use crate::image::Grid;
+use crate::pair;
+
+use super::image::{ImagePotential, Interpolation, PotentialError};
+
+/// The two parts of the total potential energy P, without unit, as they enter it.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub struct Energy {
+    /// (1 − β) A, the pairs' part.
+    pub atomic: f64,
+    /// β B, the image's part.
+    pub image: f64,
+}
+
+impl Energy {
+    /// P, their sum: equation (4).
+    pub fn total(&self) -> f64 {
+        self.atomic + self.image
+    }
+}
+
+/// Computes the total potential energy of atoms and its gradient.
+pub trait Engine<const D: usize> {
+    /// Makes ready for atoms at or near `atoms`: reads d(x) and β(x) there, builds lists. To be called
+    /// before the first evaluation and then between iterations; it does only what is due. `next_move` is
+    /// the farthest any atom may go before the next call, as a share of its nominal distance.
+    ///
+    /// Returns whether the energy is another function than before, so that what was learnt of its
+    /// curvature no longer holds.
+    fn prepare(&mut self, atoms: &[Point<D>], next_move: f64) -> bool;
+
+    /// The energy, and ∂P/∂x of every atom in `gradient`.
+    fn evaluate(&mut self, atoms: &[Point<D>], gradient: &mut [Point<D>]) -> Energy;
+
+    /// The nominal distance of every atom, as last read by [`Engine::prepare`].
+    fn distances(&self) -> &[f64];
+}
+
+/// The weight β(x) of the image against regularity, in 0…1.
+///
+/// Source: Hale (2001), equations (4) and (5).
+#[derive(Clone, Debug)]
+pub struct ImageWeight<const D: usize> {
+    constant: f64,
+    field: Option<ImagePotential<D>>,
+}
+
+impl<const D: usize> ImageWeight<D> {
+    /// The same weight everywhere.
+    ///
+    /// # Errors
+    /// [`PotentialError::Weight`] if it is outside 0…1, or NaN.
+    pub fn constant(weight: f64) -> Result<Self, PotentialError> {
+        if !(0.0..=1.0).contains(&weight) {
+            return Err(PotentialError::Weight { index: None, value: weight });
+        }
+        Ok(Self { constant: weight, field: None })
+    }
+
+    /// A weight for every sample of the grid, x fastest, linear in between.
+    ///
+    /// # Errors
+    /// [`PotentialError::Weight`] if a sample is outside 0…1, or NaN; [`PotentialError::SampleCount`]
+    /// if the count is not the grid's.
+    pub fn field(grid: Grid<D>, samples: Vec<f32>) -> Result<Self, PotentialError> {
+        if let Some(i) = samples.iter().position(|w| !(0.0..=1.0).contains(w)) {
+            return Err(PotentialError::Weight { index: Some(i), value: f64::from(samples[i]) });
+        }
+        let field = ImagePotential::new(grid, samples, Interpolation::Linear)?;
+        Ok(Self { constant: 0.0, field: Some(field) })
+    }
+
+    /// β at a lattice point.
+    pub fn at(&self, p: &Point<D>) -> f64 {
+        self.field.as_ref().map_or(self.constant, |field| field.value(p))
+    }
+
+    /// β, where it is the same everywhere.
+    pub fn as_constant(&self) -> Option<f64> {
+        if self.field.is_none() { Some(self.constant) } else { None }
+    }
+}
+
+/// The total potential energy by the double sum of equation (1), and its gradient. O(n²): the reference.
+///
+/// `distances` and `weights` are d and β at the atoms. A pair's nominal distance is the mean of its
+/// atoms', which is the paper's for a constant d and its d(xⱼ) to first order otherwise.
+pub fn direct_energy<const D: usize>(
+    atoms: &[Point<D>],
+    distances: &[f64],
+    weights: &[f64],
+    potential: &ImagePotential<D>,
+    gradient: &mut [Point<D>],
+) -> Energy {
+    let mut energy = Energy::default();
+    for i in 0..atoms.len() {
+        let mut image_gradient = [0.0; D];
+        energy.image += weights[i] * potential.value_and_gradient(&atoms[i], &mut image_gradient);
+        gradient[i] = image_gradient.map(|g| g * weights[i]);
+        for j in (0..atoms.len()).filter(|&j| j != i) {
+            let v = difference(&atoms[i], &atoms[j]);
+            let r = dot(&v, &v).sqrt();
+            let d = 0.5 * (distances[i] + distances[j]);
+            let weight = 1.0 - 0.5 * (weights[i] + weights[j]);
+            energy.atomic += 0.5 * weight * pair::energy(r / d);
+            if r > 0.0 {
+                let slope = -weight * pair::force(r / d) / (d * r);
+                (0..D).for_each(|k| gradient[i][k] += slope * v[k]);
+            }
+        }
+    }
+    energy
+}
