@@ -1,9 +1,12 @@
 //! Images: samples on a grid, and the frame that places the grid in the world.
 
+mod convolve;
 mod frame;
+mod gaussian;
 mod samples;
 
 pub use frame::{Frame, FrameError, Grid, Units};
+pub use gaussian::{gaussian, gaussian_derivative};
 pub use samples::{Range, Samples};
 
 /// Samples on a regular grid, with the frame that says where they are.

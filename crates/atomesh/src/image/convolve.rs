@@ -1,0 +1,217 @@
+//! Separable convolution: one weighted sum of rows serves every axis.
+//!
+//! Along y and z the rows are rows of the image; along x they are one padded row, shifted. The
+//! weights are even or odd, so that samples at equal distance are paired before the
+//! multiplication. Every sample goes through the same additions in the same order wherever the
+//! blocks end, so results depend neither on the blocks nor on the number of threads.
+//!
+//! Outside the image samples are mirrored about its edges, `d c b a | a b c d | d c b a`.
+
+use rayon::prelude::*;
+
+/// Samples summed at once: eight vectors of four, which fit in the registers of any x86-64.
+const LANES: usize = 32;
+
+/// Samples in a scratch block: 256 KiB, half of a small second-level cache.
+const BLOCK_SAMPLES: usize = 1 << 16;
+
+/// Weights `w` of `Σ w[t] · f[i + t]` for t in −r…r, of which `half` holds 0…r.
+#[derive(Clone, Debug)]
+pub(super) struct Kernel {
+    half: Vec<f32>,
+    odd: bool,
+}
+
+impl Kernel {
+    /// A kernel with the weights of t = 0…r; those of −t are the same, or opposite if `odd`.
+    ///
+    /// Mirrored samples repeat after 2n, so that a kernel which reaches beyond an axis of `n`
+    /// samples is folded onto that period: the result is the same, the cost at most O(n).
+    pub(super) fn new(half: &[f64], odd: bool, n: usize) -> Self {
+        let mut folded = vec![0.0; half.len().min(n + 1)];
+        let sign = if odd { -1.0 } else { 1.0 };
+        for (t, &w) in half.iter().enumerate() {
+            // t and −t both stand in the sum; on the circle they may meet, at 0 and at n
+            match t % (2 * n) {
+                0 if t == 0 => folded[0] += w,
+                0 => folded[0] += w + sign * w,
+                phase if phase == n => folded[n] += 0.5 * (w + sign * w),
+                phase if phase < n => folded[phase] += w,
+                phase => folded[2 * n - phase] += sign * w,
+            }
+        }
+        Self { half: folded.iter().map(|&w| w as f32).collect(), odd }
+    }
+
+    /// How far the kernel reaches, in samples.
+    pub(super) fn radius(&self) -> usize {
+        self.half.len() - 1
+    }
+
+    /// Writes `Σ w[t] · rows[r + t]` for t in −r…r to `out`; no row may be shorter than `out`.
+    pub(super) fn weigh_rows(&self, rows: &[&[f32]], out: &mut [f32]) {
+        if self.odd {
+            self.weigh(rows, out, |left, right| right - left);
+        } else {
+            self.weigh(rows, out, |left, right| right + left);
+        }
+    }
+
+    #[inline(always)]
+    fn weigh(&self, rows: &[&[f32]], out: &mut [f32], pair: impl Fn(f32, f32) -> f32 + Copy) {
+        let whole = out.len() - out.len() % LANES;
+        let (chunks, rest) = out.split_at_mut(whole);
+        for (c, chunk) in chunks.chunks_exact_mut(LANES).enumerate() {
+            self.weigh_at::<LANES>(rows, c * LANES, chunk, pair);
+        }
+        for (i, one) in rest.chunks_exact_mut(1).enumerate() {
+            self.weigh_at::<1>(rows, whole + i, one, pair);
+        }
+    }
+
+    #[inline(always)]
+    fn weigh_at<const N: usize>(
+        &self,
+        rows: &[&[f32]],
+        start: usize,
+        out: &mut [f32],
+        pair: impl Fn(f32, f32) -> f32,
+    ) {
+        let r = self.radius();
+        let (first, beyond) = (self.half[0], &self.half[1..]);
+        let centre = &rows[r][start..start + N];
+        let mut sum = [0.0f32; N];
+        for i in 0..N {
+            sum[i] = first * centre[i];
+        }
+        for (t, &w) in beyond.iter().enumerate() {
+            let left = &rows[r - 1 - t][start..start + N];
+            let right = &rows[r + 1 + t][start..start + N];
+            for i in 0..N {
+                sum[i] += w * pair(left[i], right[i]);
+            }
+        }
+        out.copy_from_slice(&sum);
+    }
+}
+
+/// The sample of an axis of `n` that stands `i` places from the axis' first, mirrored at both ends.
+pub(super) fn mirrored(i: isize, n: usize) -> usize {
+    let n = n as isize;
+    let phase = i.rem_euclid(2 * n);
+    (if phase < n { phase } else { 2 * n - 1 - phase }) as usize
+}
+
+/// Convolves `values` in place along every axis that has a kernel.
+///
+/// Scratch: one block of [`BLOCK_SAMPLES`] or a little more per thread.
+pub(super) fn convolve<const D: usize>(
+    values: &mut [f32],
+    shape: [usize; D],
+    kernels: &[Option<Kernel>; D],
+) {
+    assert_eq!(values.len(), shape.iter().product::<usize>(), "samples for shape {shape:?}");
+    if values.is_empty() {
+        return;
+    }
+    let slab: usize = shape[..D - 1].iter().product();
+    if kernels[..D - 1].iter().any(Option::is_some) {
+        let few = BLOCK_SAMPLES.div_ceil(slab); // rows are small work: hand out many at once
+        values.par_chunks_mut(slab).with_min_len(few).for_each_init(Vec::new, |scratch, slab| {
+            convolve_slab(slab, &shape[..D - 1], &kernels[..D - 1], scratch);
+        });
+    }
+    if let Some(kernel) = &kernels[D - 1] {
+        let width = block_width(shape[D - 1], kernel);
+        let mut columns = Columns::new(values, slab, width);
+        loop {
+            // a few thousand lines at a time: the list of lines stays small beside the image
+            let mut batch: Vec<_> = columns.by_ref().take(64).collect();
+            if batch.is_empty() {
+                break;
+            }
+            batch.par_iter_mut().for_each_init(Vec::new, |scratch, lines| {
+                convolve_lines(lines, kernel, scratch);
+            });
+        }
+    }
+}
+
+/// Convolves one slab on this thread, along the axes that it has.
+fn convolve_slab(
+    slab: &mut [f32],
+    shape: &[usize],
+    kernels: &[Option<Kernel>],
+    scratch: &mut Vec<f32>,
+) {
+    let mut inner = 1;
+    for (&n, kernel) in shape.iter().zip(kernels) {
+        if let Some(kernel) = kernel {
+            for part in slab.chunks_exact_mut(n * inner) {
+                if inner == 1 {
+                    convolve_row(part, kernel, scratch);
+                } else {
+                    for mut lines in Columns::new(part, inner, block_width(n, kernel)) {
+                        convolve_lines(&mut lines, kernel, scratch);
+                    }
+                }
+            }
+        }
+        inner *= n;
+    }
+}
+
+/// The columns of a block such that all of its lines, padded, fill the scratch.
+fn block_width(n: usize, kernel: &Kernel) -> usize {
+    let fitting = BLOCK_SAMPLES / (n + 2 * kernel.radius());
+    (fitting / LANES * LANES).clamp(2 * LANES, 32 * LANES)
+}
+
+/// Convolves contiguous samples.
+fn convolve_row(row: &mut [f32], kernel: &Kernel, scratch: &mut Vec<f32>) {
+    let (n, r) = (row.len(), kernel.radius());
+    pad_row(row, r, scratch);
+    let shifted: Vec<&[f32]> = (0..=2 * r).map(|t| &scratch[t..t + n]).collect();
+    kernel.weigh_rows(&shifted, row);
+}
+
+/// Writes `row` to `padded` with `r` mirrored samples before and behind it.
+fn pad_row(row: &[f32], r: usize, padded: &mut Vec<f32>) {
+    let n = row.len();
+    padded.clear();
+    padded.extend((0..r).map(|i| row[mirrored(i as isize - r as isize, n)]));
+    padded.extend_from_slice(row);
+    padded.extend((n..n + r).map(|i| row[mirrored(i as isize, n)]));
+}
+
+/// Convolves across lines of equal length, which lie at successive places along the axis.
+fn convolve_lines(lines: &mut [&mut [f32]], kernel: &Kernel, scratch: &mut Vec<f32>) {
+    let (n, r, width) = (lines.len(), kernel.radius(), lines[0].len());
+    scratch.clear();
+    for i in 0..n + 2 * r {
+        scratch.extend_from_slice(lines[mirrored(i as isize - r as isize, n)]);
+    }
+    let rows: Vec<&[f32]> = scratch.chunks_exact(width).collect();
+    for (line, rows) in lines.iter_mut().zip(rows.windows(2 * r + 1)) {
+        kernel.weigh_rows(rows, line);
+    }
+}
+
+/// Cuts an array of lines of `inner` samples into blocks of columns, each given as its lines.
+struct Columns<'a> {
+    lines: Vec<std::slice::ChunksMut<'a, f32>>,
+}
+
+impl<'a> Columns<'a> {
+    fn new(values: &'a mut [f32], inner: usize, width: usize) -> Self {
+        Self { lines: values.chunks_exact_mut(inner).map(|l| l.chunks_mut(width)).collect() }
+    }
+}
+
+impl<'a> Iterator for Columns<'a> {
+    type Item = Vec<&'a mut [f32]>;
+
+    fn next(&mut self) -> Option<Self::Item> {
+        self.lines.iter_mut().map(Iterator::next).collect()
+    }
+}
