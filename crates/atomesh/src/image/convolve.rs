@@ -43,6 +43,12 @@ impl Kernel {
         Self { half: folded.iter().map(|&w| w as f32).collect(), odd }
     }
 
+    /// The kernel with every weight times `factor`.
+    pub(super) fn scaled(&self, factor: f64) -> Self {
+        let half = self.half.iter().map(|&w| (f64::from(w) * factor) as f32).collect();
+        Self { half, odd: self.odd }
+    }
+
     /// How far the kernel reaches, in samples.
     pub(super) fn radius(&self) -> usize {
         self.half.len() - 1
@@ -138,7 +144,7 @@ pub(super) fn convolve<const D: usize>(
 }
 
 /// Convolves one slab on this thread, along the axes that it has.
-fn convolve_slab(
+pub(super) fn convolve_slab(
     slab: &mut [f32],
     shape: &[usize],
     kernels: &[Option<Kernel>],

@@ -3,10 +3,13 @@
 mod convolve;
 mod frame;
 mod gaussian;
+mod gradient;
 mod samples;
 
 pub use frame::{Frame, FrameError, Grid, Units};
 pub use gaussian::{gaussian, gaussian_derivative};
+pub(crate) use gradient::{Stencil, magnitude};
+pub use gradient::{gradient_magnitude, prewitt_magnitude};
 pub use samples::{Range, Samples};
 
 /// Samples on a regular grid, with the frame that says where they are.

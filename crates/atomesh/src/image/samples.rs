@@ -1,5 +1,6 @@
 //! Sample values in the type in which a file holds them.
 
+use rayon::prelude::*;
 use std::ops::Range as IndexRange;
 
 /// Sample values, kept in the type of the file so that a large image is held once.
@@ -37,6 +38,22 @@ pub struct Range {
     pub nan_count: usize,
     /// How many samples are infinite.
     pub infinite_count: usize,
+}
+
+/// The range of some samples.
+fn range_of(samples: impl Iterator<Item = f64>) -> Range {
+    let mut range = Range { min: f64::NAN, max: f64::NAN, nan_count: 0, infinite_count: 0 };
+    for s in samples {
+        if s.is_finite() {
+            range.min = range.min.min(s); // f64::min ignores the initial NaN
+            range.max = range.max.max(s);
+        } else if s.is_nan() {
+            range.nan_count += 1;
+        } else {
+            range.infinite_count += 1;
+        }
+    }
+    range
 }
 
 /// Runs the same expression on whichever vector the samples hold.
@@ -114,21 +131,28 @@ impl Samples {
         }
     }
 
+    /// Writes `map` of the samples from index `start` on to `out`, until it is full.
+    ///
+    /// # Panics
+    /// If there are not as many samples.
+    pub fn map_into(&self, start: usize, out: &mut [f32], map: impl Fn(f64) -> f32) {
+        let end = start + out.len();
+        each!(self, v => for (o, &s) in out.iter_mut().zip(&v[start..end]) {
+            *o = map(f64::from(s));
+        });
+    }
+
     /// The least and greatest sample, and the count of those that are not finite.
     pub fn range(&self) -> Range {
-        let mut range = Range { min: f64::NAN, max: f64::NAN, nan_count: 0, infinite_count: 0 };
-        each!(self, v => for &s in v {
-            let s = f64::from(s);
-            if s.is_finite() {
-                range.min = range.min.min(s); // f64::min ignores the initial NaN
-                range.max = range.max.max(s);
-            } else if s.is_nan() {
-                range.nan_count += 1;
-            } else {
-                range.infinite_count += 1;
-            }
-        });
-        range
+        each!(self, v => v
+        .par_chunks(1 << 16)
+        .map(|part| range_of(part.iter().map(|&s| f64::from(s))))
+        .reduce(|| range_of([].into_iter()), |a, b| Range {
+            min: a.min.min(b.min), // f64::min prefers a number to NaN
+            max: a.max.max(b.max),
+            nan_count: a.nan_count + b.nan_count,
+            infinite_count: a.infinite_count + b.infinite_count,
+        }))
     }
 
     /// Replaces every NaN by `value` and returns how many there were.
