@@ -6,17 +6,17 @@
 //!
 //! The modules follow that order; each names only modules above it in this list.
 
-pub mod distance;
-pub mod enhance;
 pub mod geometry;
-pub mod image;
-pub mod lattice;
-pub mod measure;
-pub mod mesh;
-pub mod minimize;
-pub mod optimize;
-pub mod pair;
-pub mod pipeline;
-pub mod potential;
-pub mod synth;
 pub mod watch;
+pub mod pair;
+pub mod minimize;
+pub mod image;
+pub mod synth;
+pub mod enhance;
+pub mod mesh;
+pub mod distance;
+pub mod potential;
+pub mod lattice;
+pub mod optimize;
+pub mod measure;
+pub mod pipeline;

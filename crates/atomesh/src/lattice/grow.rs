@@ -10,9 +10,9 @@ use crate::distance::NominalDistance;
 use crate::geometry::{Bounds, Point};
 use crate::watch::{Cancelled, Phase, Watch, check};
 
+use super::Lattice;
 use super::crystal::Crystal;
 use super::occupancy::Occupancy;
-use super::Lattice;
 
 /// How a lattice is grown.
 #[derive(Clone, Debug, PartialEq)]
@@ -41,7 +41,9 @@ pub enum LatticeError {
         axis: usize,
     },
     /// A seed point lies outside the box.
-    #[error("seed point {index} at {point:?} lies outside the box {min:?} to {max:?} (lattice coordinates)")]
+    #[error(
+        "seed point {index} at {point:?} lies outside the box {min:?} to {max:?} (lattice coordinates)"
+    )]
     SeedOutside {
         /// The point's place in the list.
         index: usize,
@@ -190,7 +192,12 @@ impl<'a, const D: usize> Growth<'a, D> {
     }
 
     /// One face of the box in 3-D, where `normal` is at its least or greatest.
-    fn face(&mut self, normal: usize, far: bool, watch: &mut dyn Watch) -> Result<(), LatticeError> {
+    fn face(
+        &mut self,
+        normal: usize,
+        far: bool,
+        watch: &mut dyn Watch,
+    ) -> Result<(), LatticeError> {
         let axes: Vec<usize> = (0..D).filter(|&k| k != normal).collect();
         let Bounds { min, max } = self.lattice.bounds;
         let mut centre: Point<D> = std::array::from_fn(|k| 0.5 * (min[k] + max[k]));

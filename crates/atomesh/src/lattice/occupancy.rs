@@ -35,14 +35,7 @@ impl<const D: usize> Occupancy<D> {
         let levels = (0..count)
             .map(|l| Level::new(&bounds, (least * 2f64.powi(l as i32 + 1)).min(greatest), expected))
             .collect();
-        Self {
-            bounds,
-            least,
-            levels,
-            centers: Vec::new(),
-            diameters: Vec::new(),
-            next: Vec::new(),
-        }
+        Self { bounds, least, levels, centers: Vec::new(), diameters: Vec::new(), next: Vec::new() }
     }
 
     /// Whether a ball of this diameter at `p` meets no other.
@@ -90,7 +83,13 @@ impl<const D: usize> Level<D> {
             cell *= 1.25;
         }
         let shape = extent.map(|e| (e / cell) as usize + 1);
-        Self { greatest: diameter, width: cell, shape, heads: vec![NONE; shape.iter().product()], used: false }
+        Self {
+            greatest: diameter,
+            width: cell,
+            shape,
+            heads: vec![NONE; shape.iter().product()],
+            used: false,
+        }
     }
 
     fn along(&self, x: f64, k: usize) -> usize {
@@ -136,9 +135,9 @@ mod tests {
             for _ in 0..2000 {
                 let p = std::array::from_fn(|_| 20.0 * random.random::<f64>());
                 let diameter = 0.5 + 5.5 * random.random::<f64>().powi(2);
-                let free = balls.iter().all(|(q, e)| {
-                    distance_squared(&p, q).sqrt() >= 0.5 * (diameter + e)
-                });
+                let free = balls
+                    .iter()
+                    .all(|(q, e)| distance_squared(&p, q).sqrt() >= 0.5 * (diameter + e));
                 assert_eq!(occupancy.is_free(&p, diameter), free, "seed {seed}");
                 if free {
                     occupancy.take(p, diameter);

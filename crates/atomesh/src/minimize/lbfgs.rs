@@ -174,7 +174,8 @@ impl Lbfgs {
         store_difference(&mut pair.step, trial_x, x);
         store_difference(&mut pair.change, trial_gradient, gradient);
         pair.curvature = dot(&pair.step, &pair.change);
-        let least = 1e-10 * dot(&pair.change, &pair.change).sqrt() * dot(&pair.step, &pair.step).sqrt();
+        let least =
+            1e-10 * dot(&pair.change, &pair.change).sqrt() * dot(&pair.step, &pair.step).sqrt();
         if pair.curvature > least {
             self.history.push_back(pair);
         } else {

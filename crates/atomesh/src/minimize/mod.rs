@@ -9,7 +9,7 @@ mod lbfgs;
 mod search;
 
 pub use lbfgs::{Lbfgs, LbfgsOptions};
-pub use search::{descend, Step};
+pub use search::{Step, descend};
 
 /// A function to minimize.
 pub trait Objective {

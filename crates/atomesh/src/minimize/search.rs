@@ -117,7 +117,11 @@ fn interpolate(low: f64, high: f64, value_0: f64, slope_0: f64, value_high: f64)
     let curvature = 2.0 * (value_high - value_0 - slope_0 * high) / (high * high);
     let guess = -slope_0 / curvature;
     let width = high - low;
-    if guess.is_finite() { guess.clamp(low + 0.1 * width, high - 0.4 * width) } else { 0.5 * (low + high) }
+    if guess.is_finite() {
+        guess.clamp(low + 0.1 * width, high - 0.4 * width)
+    } else {
+        0.5 * (low + high)
+    }
 }
 
 /// One iteration of steepest descent from `x`, which it moves; returns how it ended and the value.

@@ -26,9 +26,8 @@ pub(super) struct LatticeEnergy<E, const D: usize> {
 
 impl<E: Engine<D>, const D: usize> LatticeEnergy<E, D> {
     pub fn new(lattice: Lattice<D>, mut engine: E, margin: f64, longest_move: f64) -> Self {
-        let mobility: Vec<f32> = (0..lattice.len() * D)
-            .map(|v| lattice.mobility(v / D, v % D) as f32)
-            .collect();
+        let mobility: Vec<f32> =
+            (0..lattice.len() * D).map(|v| lattice.mobility(v / D, v % D) as f32).collect();
         engine.prepare(lattice.atoms(), longest_move);
         let tempered = mobility.iter().any(|&m| m != 0.0 && m != 1.0);
         Self { lattice, engine, margin, longest_move, mobility, tempered, atoms: Vec::new() }

@@ -23,7 +23,7 @@ impl Energy {
 }
 
 /// Computes the total potential energy of atoms and its gradient.
-pub trait Engine<const D: usize> {
+pub trait Engine<const D: usize>: Sync {
     /// Makes ready for atoms at or near `atoms`: reads d(x) and β(x) there, builds lists. To be called
     /// before the first evaluation and then between iterations; it does only what is due. `next_move` is
     /// the farthest any atom may go before the next call, as a share of its nominal distance.

@@ -128,9 +128,7 @@ impl<const D: usize> ImagePotential<D> {
         match self.interpolation {
             Interpolation::Nearest => self.nearest(p, gradient),
             Interpolation::Linear => self.linear(p, gradient),
-            Interpolation::Spline => {
-                spline::evaluate(&self.spline, &self.grid, p, gradient)
-            }
+            Interpolation::Spline => spline::evaluate(&self.spline, &self.grid, p, gradient),
         }
     }
 
@@ -147,9 +145,13 @@ impl<const D: usize> ImagePotential<D> {
         let index = self.nearest_index(p);
         let at = (0..D).map(|k| index[k] * self.strides[k]).sum::<usize>();
         for k in 0..D {
-            gradient[k] =
-                centred_difference(&self.samples, at, index[k], self.grid.shape[k], self.strides[k])
-                    * self.scale[k];
+            gradient[k] = centred_difference(
+                &self.samples,
+                at,
+                index[k],
+                self.grid.shape[k],
+                self.strides[k],
+            ) * self.scale[k];
         }
         f64::from(self.samples[at])
     }
@@ -204,7 +206,8 @@ pub(super) fn centred_difference(
     count: usize,
     stride: usize,
 ) -> f64 {
-    let (low, high) = (if index > 0 { stride } else { 0 }, if index + 1 < count { stride } else { 0 });
+    let (low, high) =
+        (if index > 0 { stride } else { 0 }, if index + 1 < count { stride } else { 0 });
     let span = (low + high) / stride;
     if span == 0 {
         return 0.0;
@@ -271,10 +274,12 @@ mod tests {
     }
 
     fn gradient_is_slope<const D: usize>(interpolation: Interpolation) {
-        let potential = sampled([12; D], [1.0, 0.75, 1.5][..D].try_into().unwrap(), wave, interpolation);
+        let potential =
+            sampled([12; D], [1.0, 0.75, 1.5][..D].try_into().unwrap(), wave, interpolation);
         for trial in 0..50 {
             // off the samples, where the linear gradient jumps
-            let p: Point<D> = std::array::from_fn(|k| 1.13 + 0.131 * f64::from(trial) + 0.21 * k as f64);
+            let p: Point<D> =
+                std::array::from_fn(|k| 1.13 + 0.131 * f64::from(trial) + 0.21 * k as f64);
             let mut gradient = [0.0; D];
             potential.value_and_gradient(&p, &mut gradient);
             for k in 0..D {
@@ -298,7 +303,8 @@ mod tests {
 
     #[test]
     fn every_way_passes_through_the_samples() {
-        for interpolation in [Interpolation::Nearest, Interpolation::Linear, Interpolation::Spline] {
+        for interpolation in [Interpolation::Nearest, Interpolation::Linear, Interpolation::Spline]
+        {
             let potential = sampled([7, 5], [2.0, 0.5], wave, interpolation);
             for j in 0..5 {
                 for i in 0..7 {
@@ -312,11 +318,15 @@ mod tests {
 
     #[test]
     fn thin_images_and_points_outside_are_read_without_a_panic() {
-        for interpolation in [Interpolation::Nearest, Interpolation::Linear, Interpolation::Spline] {
+        for interpolation in [Interpolation::Nearest, Interpolation::Linear, Interpolation::Spline]
+        {
             let potential = sampled([1, 4], [1.0, 1.0], |_| -0.5, interpolation);
             for p in [[-3.0, -9.0], [0.0, 1.5], [99.0, 99.0], [f64::NAN, 0.0]] {
                 let value = potential.value(&p);
-                assert!(value.is_nan() || (value + 0.5).abs() < 1e-6, "{interpolation:?} {p:?} {value}");
+                assert!(
+                    value.is_nan() || (value + 0.5).abs() < 1e-6,
+                    "{interpolation:?} {p:?} {value}"
+                );
             }
         }
     }

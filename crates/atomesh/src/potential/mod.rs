@@ -13,7 +13,7 @@ mod pairs;
 mod sampled;
 mod spline;
 
-pub use engine::{Engine, Energy, ImageWeight, direct_energy};
+pub use engine::{Energy, Engine, ImageWeight, direct_energy};
 pub use image::{ImagePotential, Interpolation, PotentialError};
 pub use pairs::PairsEngine;
 pub use sampled::SampledEngine;

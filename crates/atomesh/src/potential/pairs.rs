@@ -86,15 +86,12 @@ impl<'a, const D: usize> PairsEngine<'a, D> {
 
     fn pack(&mut self, atoms: &[Point<D>]) {
         self.packed.resize(atoms.len(), [0.0; 4]);
-        self.packed
-            .par_iter_mut()
-            .with_min_len(CHUNK)
-            .zip(atoms)
-            .zip(&self.distances)
-            .for_each(|((packed, p), &d)| {
+        self.packed.par_iter_mut().with_min_len(CHUNK).zip(atoms).zip(&self.distances).for_each(
+            |((packed, p), &d)| {
                 packed[..D].copy_from_slice(p);
                 packed[3] = d;
-            });
+            },
+        );
     }
 
     /// Energy and gradient of one chunk of atoms, each gathering over its own list.
