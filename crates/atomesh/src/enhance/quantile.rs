@@ -1,0 +1,125 @@
+//! Exact order statistics in O(N), without sorting or copying.
+//!
+//! The bits of numbers above 0 are in the numbers' own order. One pass counts their upper halves,
+//! which finds the half of the value wanted; a second counts the lower halves beneath it. Counts
+//! are whole numbers, so that threads may add them up in any order.
+
+use rayon::prelude::*;
+
+/// Samples read at once.
+const BLOCK: usize = 1 << 14;
+
+/// Samples counted by one thread before counts are added up.
+const PART: usize = 1 << 20;
+
+/// A value by its place in the order, and how many samples are on either side.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub(super) struct Ranked {
+    pub(super) value: f32,
+    /// Samples less than the value.
+    pub(super) below: usize,
+    /// Samples greater than the value.
+    pub(super) above: usize,
+}
+
+/// The sample with `rank` others before it in ascending order, of the `count` samples, none
+/// negative, that `fill(start, out)` writes. Ranks beyond the last are the last; 0 without samples.
+pub(super) fn ranked(
+    count: usize,
+    fill: &(impl Fn(usize, &mut [f32]) + Sync),
+    rank: usize,
+) -> Ranked {
+    let rank = rank.min(count.saturating_sub(1));
+    let (upper, before_upper) = locate(&histogram(count, fill, |bits| Some(bits >> 16)), rank);
+    let lower_halves =
+        histogram(count, fill, |bits| (bits >> 16 == upper).then_some(bits & 0xffff));
+    let (lower, before_lower) = locate(&lower_halves, rank - before_upper);
+    let below = before_upper + before_lower;
+    let equal = lower_halves[lower as usize] as usize;
+    let value = f32::from_bits(upper << 16 | lower);
+    Ranked { value, below, above: count - below - equal }
+}
+
+/// The bin that holds the sample with `rank` others before it, and the samples in earlier bins.
+fn locate(bins: &[u64], rank: usize) -> (u32, usize) {
+    let mut before = 0;
+    for (bin, &here) in bins.iter().enumerate() {
+        if rank < before + here as usize {
+            return (bin as u32, before);
+        }
+        before += here as usize;
+    }
+    (0, 0) // no samples
+}
+
+/// How many samples fall into each of 2¹⁶ bins.
+fn histogram(
+    count: usize,
+    fill: &(impl Fn(usize, &mut [f32]) + Sync),
+    bin: impl Fn(u32) -> Option<u32> + Sync,
+) -> Vec<u64> {
+    let empty = || vec![0u64; 1 << 16];
+    let count_part = |mut bins: Vec<u64>, part: usize| {
+        let end = count.min((part + 1) * PART);
+        let mut block = [0.0; BLOCK];
+        for start in (part * PART..end).step_by(BLOCK) {
+            let block = &mut block[..BLOCK.min(end - start)];
+            fill(start, block);
+            for value in block {
+                // + 0.0 turns −0 into 0, whose bits are in order
+                if let Some(bin) = bin((*value + 0.0).to_bits()) {
+                    bins[bin as usize] += 1;
+                }
+            }
+        }
+        bins
+    };
+    let add = |mut a: Vec<u64>, b: Vec<u64>| {
+        a.iter_mut().zip(b).for_each(|(a, b)| *a += b);
+        a
+    };
+    (0..count.div_ceil(PART)).into_par_iter().fold(empty, count_part).reduce(empty, add)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use proptest::prelude::*;
+
+    fn of(values: &[f32], rank: usize) -> Ranked {
+        let fill = |start: usize, out: &mut [f32]| {
+            out.copy_from_slice(&values[start..start + out.len()]);
+        };
+        ranked(values.len(), &fill, rank)
+    }
+
+    proptest! {
+        #[test]
+        fn equals_the_sorted_sample(
+            mut values in prop::collection::vec(
+                prop_oneof![0.0f32..1.0, Just(0.5), Just(0.0), Just(-0.0), 0.0f32..1e-30], 1..300
+            ),
+            rank in 0usize..300,
+        ) {
+            let found = of(&values, rank);
+            values.sort_by(f32::total_cmp);
+            let value = values[rank.min(values.len() - 1)];
+            prop_assert_eq!(found.value, value);
+            prop_assert_eq!(found.below, values.iter().filter(|&&v| v < value).count());
+            prop_assert_eq!(found.above, values.iter().filter(|&&v| v > value).count());
+        }
+    }
+
+    #[test]
+    fn several_parts_add_up() {
+        let values: Vec<f32> = (0..2 * PART + 77).map(|i| (i % 1000) as f32).collect();
+        let found = of(&values, values.len() / 2);
+        let below = values.iter().filter(|&&v| v < found.value).count();
+        assert_eq!((found.value, found.below), (499.0, below));
+    }
+
+    #[test]
+    fn no_samples_have_rank_zero() {
+        assert_eq!(of(&[], 3), Ranked { value: 0.0, below: 0, above: 0 });
+    }
+}
