@@ -1,0 +1,46 @@
+//! Image work, in samples per second: Gaussian, gradients, potentials.
+
+use atomesh::enhance::{FeatureOptions, Features, enhance};
+use atomesh::image::{
+    Frame, Grid, Image, Samples, gaussian, gradient_magnitude, prewitt_magnitude,
+};
+use atomesh::watch::Silent;
+use criterion::{Criterion, Throughput, criterion_group, criterion_main};
+
+const SIDE: usize = 256;
+const SHAPE: [usize; 3] = [SIDE; 3];
+
+/// Layers with some texture, as bytes.
+fn layers() -> Vec<u8> {
+    (0..SIDE * SIDE * SIDE).map(|i| ((i >> 19) * 16 + i * 31 % 13) as u8).collect()
+}
+
+fn image_work(criterion: &mut Criterion) {
+    let mut group = criterion.benchmark_group("image");
+    group.sample_size(10).throughput(Throughput::Elements((SIDE * SIDE * SIDE) as u64));
+
+    let mut values: Vec<f32> = layers().iter().map(|&v| v.into()).collect();
+    for (axis, name) in ["gaussian_x", "gaussian_y", "gaussian_z"].into_iter().enumerate() {
+        let sigma = std::array::from_fn(|k| if k == axis { 2.0 } else { 0.0 });
+        group.bench_function(name, |b| b.iter(|| gaussian(&mut values, SHAPE, sigma)));
+    }
+    group.bench_function("gaussian", |b| b.iter(|| gaussian(&mut values, SHAPE, [2.0; 3])));
+
+    let samples = Samples::U8(layers());
+    let grid = Grid { shape: SHAPE, step: [1.0; 3] };
+    group.bench_function("gradient_gaussian", |b| {
+        b.iter(|| gradient_magnitude(&samples, &grid, 1.5));
+    });
+    group.bench_function("gradient_prewitt", |b| b.iter(|| prewitt_magnitude(&samples, &grid)));
+
+    let Ok(frame) = Frame::new(SHAPE) else { return };
+    let Ok(image) = Image::new(frame, samples) else { return };
+    for (features, name) in [(Features::Dark, "enhance_dark"), (Features::Edges, "enhance_edges")] {
+        let options = FeatureOptions { features, ..Default::default() };
+        group.bench_function(name, |b| b.iter(|| enhance(&image, &options, &mut Silent)));
+    }
+    group.finish();
+}
+
+criterion_group!(benches, image_work);
+criterion_main!(benches);
