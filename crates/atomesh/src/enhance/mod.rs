@@ -20,7 +20,7 @@ mod scale;
 
 use crate::image::{Image, Samples, Stencil, Units, gaussian, magnitude};
 use crate::watch::{Cancelled, Phase, Watch, check};
-use quantile::ranked;
+use quantile::Order;
 use rayon::prelude::*;
 use scale::{Ramp, UnitSamples};
 use serde::{Deserialize, Serialize};
@@ -245,9 +245,10 @@ fn edges<const D: usize>(
     };
     let count = values.len();
     let share = |clipped: f64| count - 1 - (clipped * count as f64) as usize;
-    let mut feature = ranked(count, &copy, share(CLIPPED_EDGES)).value;
+    let order = Order::new(count, copy);
+    let mut feature = order.ranked(share(CLIPPED_EDGES)).value;
     if feature == 0.0 {
-        feature = ranked(count, &copy, share(0.0)).value;
+        feature = order.ranked(share(0.0)).value;
     }
     if feature == 0.0 {
         return Ok(Enhanced { values, constant: true });

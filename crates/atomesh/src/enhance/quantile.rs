@@ -22,22 +22,34 @@ pub(super) struct Ranked {
     pub(super) above: usize,
 }
 
-/// The sample with `rank` others before it in ascending order, of the `count` samples, none
-/// negative, that `fill(start, out)` writes. Ranks beyond the last are the last; 0 without samples.
-pub(super) fn ranked(
+/// The samples, none negative, that `fill(start, out)` writes, ready to be asked for their order.
+pub(super) struct Order<F> {
     count: usize,
-    fill: &(impl Fn(usize, &mut [f32]) + Sync),
-    rank: usize,
-) -> Ranked {
-    let rank = rank.min(count.saturating_sub(1));
-    let (upper, before_upper) = locate(&histogram(count, fill, |bits| Some(bits >> 16)), rank);
-    let lower_halves =
-        histogram(count, fill, |bits| (bits >> 16 == upper).then_some(bits & 0xffff));
-    let (lower, before_lower) = locate(&lower_halves, rank - before_upper);
-    let below = before_upper + before_lower;
-    let equal = lower_halves[lower as usize] as usize;
-    let value = f32::from_bits(upper << 16 | lower);
-    Ranked { value, below, above: count - below - equal }
+    fill: F,
+    /// How many samples have each upper half.
+    upper_halves: Vec<u64>,
+}
+
+impl<F: Fn(usize, &mut [f32]) + Sync> Order<F> {
+    pub(super) fn new(count: usize, fill: F) -> Self {
+        let upper_halves = histogram(count, &fill, |bits| Some(bits >> 16));
+        Self { count, fill, upper_halves }
+    }
+
+    /// The sample with `rank` others before it in ascending order. Ranks beyond the last are the
+    /// last; 0 without samples.
+    pub(super) fn ranked(&self, rank: usize) -> Ranked {
+        let rank = rank.min(self.count.saturating_sub(1));
+        let (upper, before_upper) = locate(&self.upper_halves, rank);
+        let lower_halves = histogram(self.count, &self.fill, |bits| {
+            (bits >> 16 == upper).then_some(bits & 0xffff)
+        });
+        let (lower, before_lower) = locate(&lower_halves, rank - before_upper);
+        let below = before_upper + before_lower;
+        let equal = lower_halves[lower as usize] as usize;
+        let value = f32::from_bits(upper << 16 | lower);
+        Ranked { value, below, above: self.count - below - equal }
+    }
 }
 
 /// The bin that holds the sample with `rank` others before it, and the samples in earlier bins.
@@ -90,7 +102,7 @@ mod tests {
         let fill = |start: usize, out: &mut [f32]| {
             out.copy_from_slice(&values[start..start + out.len()]);
         };
-        ranked(values.len(), &fill, rank)
+        Order::new(values.len(), fill).ranked(rank)
     }
 
     proptest! {

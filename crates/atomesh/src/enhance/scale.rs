@@ -1,6 +1,6 @@
 //! Scaling of samples: where the background is, and where a full feature.
 
-use super::quantile::{Ranked, ranked};
+use super::quantile::Order;
 use super::{BLOCK, EnhanceError, Enhanced};
 use crate::image::Samples;
 use rayon::prelude::*;
@@ -15,6 +15,7 @@ pub(super) struct UnitSamples<'a> {
     /// Half the least sample and half the range: halves, lest the range overflows.
     half_min: f64,
     half_range: f64,
+    scale: f64,
 }
 
 impl<'a> UnitSamples<'a> {
@@ -27,7 +28,8 @@ impl<'a> UnitSamples<'a> {
             return Err(EnhanceError::NotFinite { count, first, value: samples.get(first) });
         }
         let half_min = 0.5 * range.min;
-        Ok(Self { samples, half_min, half_range: 0.5 * range.max - half_min })
+        let half_range = 0.5 * range.max - half_min;
+        Ok(Self { samples, half_min, half_range, scale: half_range.recip() })
     }
 
     pub(super) fn len(&self) -> usize {
@@ -35,16 +37,16 @@ impl<'a> UnitSamples<'a> {
     }
 
     pub(super) fn is_constant(&self) -> bool {
-        self.half_range == 0.0
+        self.half_range < f64::MIN_POSITIVE // the reciprocal of less would overflow
     }
 
     pub(super) fn fill(&self, start: usize, out: &mut [f32]) {
-        let (min, range) = (self.half_min, self.half_range);
-        self.samples.map_into(start, out, |s| ((0.5 * s - min) / range) as f32);
+        let (min, scale) = (self.half_min, self.scale);
+        self.samples.map_into(start, out, |s| ((0.5 * s - min) * scale) as f32);
     }
 
-    fn ranked(&self, rank: usize) -> Ranked {
-        ranked(self.len(), &|start, out: &mut [f32]| self.fill(start, out), rank)
+    fn order(&self) -> Order<impl Fn(usize, &mut [f32]) + Sync> {
+        Order::new(self.len(), |start, out: &mut [f32]| self.fill(start, out))
     }
 
     pub(super) fn map(&self, ramp: &Ramp) -> Enhanced {
@@ -65,21 +67,23 @@ pub(super) struct Ramp {
 
 impl Ramp {
     pub(super) fn dark(unit: &UnitSamples) -> Self {
-        let median = unit.ranked(unit.len() / 2);
+        let order = unit.order();
+        let median = order.ranked(unit.len() / 2);
         if median.below == 0 {
             return Self { background: 1.0, feature: 0.0 };
         }
         let clipped = (CLIPPED_FEATURES * median.below as f64) as usize;
-        Self { background: median.value, feature: unit.ranked(clipped).value }
+        Self { background: median.value, feature: order.ranked(clipped).value }
     }
 
     pub(super) fn bright(unit: &UnitSamples) -> Self {
-        let median = unit.ranked(unit.len() / 2);
+        let order = unit.order();
+        let median = order.ranked(unit.len() / 2);
         if median.above == 0 {
             return Self { background: 0.0, feature: 1.0 };
         }
         let clipped = (CLIPPED_FEATURES * median.above as f64) as usize;
-        Self { background: median.value, feature: unit.ranked(unit.len() - 1 - clipped).value }
+        Self { background: median.value, feature: order.ranked(unit.len() - 1 - clipped).value }
     }
 
     pub(super) fn apply(&self, values: &mut [f32]) {

@@ -11,6 +11,7 @@ use super::gaussian::kernel;
 use super::{Grid, Samples};
 use crate::watch::Cancelled;
 use rayon::prelude::*;
+use std::cmp::Ordering;
 
 /// Samples weighted at once along the last axis: 8 KiB, so that a sum stays in the nearest cache.
 const CHUNK: usize = 2048;
@@ -115,8 +116,11 @@ struct Stream<F, const D: usize> {
     shape: [usize; D],
     /// Samples of a plane across the last axis.
     plane: usize,
-    /// Of each component, the kernels along every axis: a slope along its own, averages elsewhere.
+    /// Of each component, a slope along its own axis and averages along later ones; the averages
+    /// along earlier ones are shared between components.
     kernels: [[Option<Kernel>; D]; D],
+    /// Per axis, the average along it alone.
+    shared: [[Option<Kernel>; D]; D],
     /// How far kernels reach along the last axis.
     radius: usize,
 }
@@ -127,17 +131,20 @@ impl<F: Fn(usize, &mut [f32]) + Sync, const D: usize> Stream<F, D> {
         let kernels = std::array::from_fn(|component| {
             std::array::from_fn(|axis| {
                 let (average, slope): &(Kernel, Kernel) = &pairs[axis];
-                Some(if axis == component {
-                    slope.scaled(1.0 / grid.step[axis])
-                } else {
-                    average.clone()
-                })
+                match axis.cmp(&component) {
+                    Ordering::Less => None,
+                    Ordering::Equal => Some(slope.scaled(1.0 / grid.step[axis])),
+                    Ordering::Greater => Some(average.clone()),
+                }
             })
+        });
+        let shared = std::array::from_fn(|along| {
+            std::array::from_fn(|axis| (axis == along).then(|| pairs[axis].0.clone()))
         });
         let (average, slope) = &pairs[D - 1];
         let radius = average.radius().max(slope.radius());
         let plane = grid.shape[..D - 1].iter().product();
-        Self { fill, shape: grid.shape, plane, kernels, radius }
+        Self { fill, shape: grid.shape, plane, kernels, shared, radius }
     }
 
     /// Writes the planes from `first` on, as many as fit in `out`.
@@ -149,16 +156,25 @@ impl<F: Fn(usize, &mut [f32]) + Sync, const D: usize> Stream<F, D> {
         for arrived in 0..count + depth - 1 {
             let place = (first + arrived) as isize - self.radius as isize;
             let source = mirrored(place, self.shape[D - 1]);
-            for (component, ring) in ring.iter_mut().enumerate() {
-                let slot = &mut ring[arrived % depth * self.plane..][..self.plane];
-                (self.fill)(source * self.plane, slot);
-                let kernels = &self.kernels[component][..D - 1];
-                convolve_slab(slot, &self.shape[..D - 1], kernels, &mut scratch);
-            }
+            let slots =
+                ring.each_mut().map(|r| &mut r[arrived % depth * self.plane..][..self.plane]);
+            self.weigh_within(source * self.plane, slots, &mut scratch);
             if let Some(complete) = (arrived + 1).checked_sub(depth) {
                 let out = &mut out[complete * self.plane..][..self.plane];
                 self.combine(&ring, complete % depth, out);
             }
+        }
+    }
+
+    /// Weighs the plane that starts at sample `start` along all axes but the last, per component.
+    fn weigh_within(&self, start: usize, mut slots: [&mut [f32]; D], scratch: &mut Vec<f32>) {
+        let Some((average, slopes)) = slots.split_last_mut() else { return };
+        let shape = &self.shape[..D - 1];
+        (self.fill)(start, average);
+        for (component, slope) in slopes.iter_mut().enumerate() {
+            slope.copy_from_slice(average);
+            convolve_slab(slope, shape, &self.kernels[component][..D - 1], scratch);
+            convolve_slab(average, shape, &self.shared[component][..D - 1], scratch);
         }
     }
 

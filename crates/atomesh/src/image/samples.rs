@@ -40,20 +40,38 @@ pub struct Range {
     pub infinite_count: usize,
 }
 
-/// The range of some samples.
-fn range_of(samples: impl Iterator<Item = f64>) -> Range {
-    let mut range = Range { min: f64::NAN, max: f64::NAN, nan_count: 0, infinite_count: 0 };
-    for s in samples {
-        if s.is_finite() {
-            range.min = range.min.min(s); // f64::min ignores the initial NaN
-            range.max = range.max.max(s);
-        } else if s.is_nan() {
-            range.nan_count += 1;
+/// The range of no samples.
+const EMPTY: Range = Range { min: f64::NAN, max: f64::NAN, nan_count: 0, infinite_count: 0 };
+
+impl Range {
+    /// The range with one more sample.
+    #[inline]
+    fn with(mut self, sample: f64) -> Self {
+        if sample.is_finite() {
+            self.min = self.min.min(sample); // f64::min prefers a number to NaN
+            self.max = self.max.max(sample);
+        } else if sample.is_nan() {
+            self.nan_count += 1;
         } else {
-            range.infinite_count += 1;
+            self.infinite_count += 1;
+        }
+        self
+    }
+
+    /// The range of the samples of both.
+    fn union(self, other: Self) -> Self {
+        Self {
+            min: self.min.min(other.min),
+            max: self.max.max(other.max),
+            nan_count: self.nan_count + other.nan_count,
+            infinite_count: self.infinite_count + other.infinite_count,
         }
     }
-    range
+}
+
+/// The range of the samples, part by part on all threads.
+fn range_of<T: Sync>(samples: &[T], part: impl Fn(&[T]) -> Range + Sync + Send) -> Range {
+    samples.par_chunks(1 << 16).map(part).reduce(|| EMPTY, Range::union)
 }
 
 /// Runs the same expression on whichever vector the samples hold.
@@ -144,15 +162,30 @@ impl Samples {
 
     /// The least and greatest sample, and the count of those that are not finite.
     pub fn range(&self) -> Range {
-        each!(self, v => v
-        .par_chunks(1 << 16)
-        .map(|part| range_of(part.iter().map(|&s| f64::from(s))))
-        .reduce(|| range_of([].into_iter()), |a, b| Range {
-            min: a.min.min(b.min), // f64::min prefers a number to NaN
-            max: a.max.max(b.max),
-            nan_count: a.nan_count + b.nan_count,
-            infinite_count: a.infinite_count + b.infinite_count,
-        }))
+        macro_rules! whole {
+            ($v:expr) => {
+                range_of($v, |part| {
+                    let (min, max) = (part.iter().min().copied(), part.iter().max().copied());
+                    Range {
+                        min: min.map_or(f64::NAN, f64::from),
+                        max: max.map_or(f64::NAN, f64::from),
+                        ..EMPTY
+                    }
+                })
+            };
+        }
+        match self {
+            Samples::U8(v) => whole!(v),
+            Samples::I8(v) => whole!(v),
+            Samples::U16(v) => whole!(v),
+            Samples::I16(v) => whole!(v),
+            Samples::U32(v) => whole!(v),
+            Samples::I32(v) => whole!(v),
+            Samples::F32(v) => {
+                range_of(v, |part| part.iter().fold(EMPTY, |r, &s| r.with(f64::from(s))))
+            }
+            Samples::F64(v) => range_of(v, |part| part.iter().fold(EMPTY, |r, &s| r.with(s))),
+        }
     }
 
     /// Replaces every NaN by `value` and returns how many there were.
