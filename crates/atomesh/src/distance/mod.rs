@@ -1,0 +1,387 @@
+//! The nominal distance d(x): the edge length wanted at x.
+//!
+//! d is smooth, |∇d| ≪ 1 (Hale 2001, section 2.1), so it is kept on nodes half the least distance
+//! apart, much fewer than the image's samples, and interpolated linearly between them. Wherever it
+//! comes from, its slope is limited: d(x) ≤ d(y) + g |x − y|, by lowering it where it is too
+//! large. It never falls below its own minimum. Lengths are in lattice units.
+
+mod coarse;
+mod limit;
+
+use crate::geometry::Point;
+use crate::image::{Grid, gaussian};
+use coarse::{Take, coarse_grid, reduce};
+use limit::limit_gradient;
+use serde::{Deserialize, Serialize};
+
+/// Greatest slope of d where none is asked for, in lattice units of d per lattice unit of way.
+///
+/// Of the order of the paper's Fig. 5 (d from 6 to 18 within some 50 samples); neighbouring edges
+/// then differ by a quarter, which a lattice follows without defects.
+pub const GRADIENT_LIMIT: f64 = 0.25;
+
+/// The share of the image, where features are densest, that gets the least distance of a grading.
+const DENSEST: f64 = 0.2;
+
+/// Why there is no nominal distance.
+#[derive(Clone, Debug, PartialEq, thiserror::Error)]
+#[non_exhaustive]
+pub enum DistanceError {
+    /// A distance is zero, negative, infinite or NaN.
+    #[error("nominal distance {value}; expected a finite length above 0")]
+    NotPositive {
+        /// The distance found.
+        value: f64,
+    },
+    /// A distance is less than the least step from sample to sample.
+    #[error("nominal distance {value} is below the sample step {step}; expected {step} or more")]
+    BelowStep {
+        /// The distance found.
+        value: f64,
+        /// The least step of all axes.
+        step: f64,
+    },
+    /// The least distance exceeds the greatest.
+    #[error("nominal distances from {min} to {max}; expected the least first")]
+    Order {
+        /// The least distance asked for.
+        min: f64,
+        /// The greatest distance asked for.
+        max: f64,
+    },
+    /// A sample of a distance field is zero, negative, infinite or NaN.
+    #[error("nominal distance {value} at sample {index}; expected a finite length above 0")]
+    FieldValue {
+        /// The index of the sample, x fastest.
+        index: usize,
+        /// The value found.
+        value: f32,
+    },
+    /// A field does not have the image's shape.
+    #[error("{found} samples of a field for an image of shape {shape:?}")]
+    FieldShape {
+        /// The image's shape: x, y (and z).
+        shape: Vec<usize>,
+        /// The samples that the field has.
+        found: usize,
+    },
+    /// The limit of the slope is zero, negative, infinite or NaN.
+    #[error("gradient limit {value}; expected a finite number above 0")]
+    GradientLimit {
+        /// The limit found.
+        value: f64,
+    },
+    /// The standard deviation of a grading's smoothing is negative, infinite or NaN.
+    #[error("smoothing {value} of the nominal distance; expected a finite length, 0 or more")]
+    Smooth {
+        /// The standard deviation found.
+        value: f64,
+    },
+}
+
+/// How d follows the density of features in an image.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields, rename_all = "kebab-case")]
+pub struct Grading {
+    /// The distance where features are densest, in lattice units.
+    pub min: f64,
+    /// The distance where there are none.
+    pub max: f64,
+    /// Standard deviation of the smoothing that turns features into their density, in lattice
+    /// units. Default: `max`, so that d changes over a few edges; with it Fig. 1 of the paper gets
+    /// about the distances of its Fig. 5 for 6…18.
+    #[serde(default)]
+    pub smooth: Option<f64>,
+    /// The greatest slope of d. Default [`GRADIENT_LIMIT`].
+    #[serde(default = "default_limit")]
+    pub gradient_limit: f64,
+}
+
+fn default_limit() -> f64 {
+    GRADIENT_LIMIT
+}
+
+impl Grading {
+    /// From `min` to `max`, the rest by default.
+    pub fn new(min: f64, max: f64) -> Self {
+        Self { min, max, smooth: None, gradient_limit: GRADIENT_LIMIT }
+    }
+}
+
+/// The nominal distance d(x) over an image's box, in lattice units.
+#[derive(Clone, Debug, PartialEq)]
+pub struct NominalDistance<const D: usize> {
+    /// Nodes over the image's box; of a constant, one.
+    nodes: Grid<D>,
+    inverse_step: [f64; D],
+    /// d at the nodes, x fastest; empty for a constant.
+    values: Vec<f32>,
+    /// The box's area or volume.
+    measure: f64,
+    least: f64,
+    greatest: f64,
+}
+
+impl<const D: usize> NominalDistance<D> {
+    /// The same distance everywhere.
+    ///
+    /// # Errors
+    /// [`DistanceError::NotPositive`], [`DistanceError::BelowStep`].
+    pub fn constant(grid: &Grid<D>, distance: f64) -> Result<Self, DistanceError> {
+        check_length(distance)?;
+        check_step(grid, distance)?;
+        Ok(Self {
+            nodes: Grid { shape: [1; D], step: grid.step },
+            inverse_step: [0.0; D],
+            values: Vec::new(),
+            measure: grid.bounds().measure(),
+            least: distance,
+            greatest: distance,
+        })
+    }
+
+    /// Small where the image has many features, large where it has few.
+    ///
+    /// |b| is smoothed to a density of features; d falls linearly with it, from `max` where the
+    /// density is least to `min` where it is among the greatest fifth, and its slope is limited.
+    /// Source: "a smoothed, scaled, and biased version of the image" (Hale 2001, Fig. 5).
+    /// Departure: the paper gives neither the smoothing nor the scale. A potential of one density
+    /// everywhere gets `max`.
+    ///
+    /// # Errors
+    /// [`DistanceError::FieldShape`] unless there is one sample of b per sample of the image; for
+    /// the grading [`DistanceError::NotPositive`], [`DistanceError::BelowStep`],
+    /// [`DistanceError::Order`], [`DistanceError::GradientLimit`] and [`DistanceError::Smooth`].
+    pub fn from_potential(
+        grid: &Grid<D>,
+        potential: &[f32],
+        grading: &Grading,
+    ) -> Result<Self, DistanceError> {
+        let Grading { min, max, gradient_limit, .. } = *grading;
+        check_count(grid, potential.len())?;
+        check_length(min)?;
+        check_length(max)?;
+        check_step(grid, min)?;
+        check_limit(gradient_limit)?;
+        if min > max {
+            return Err(DistanceError::Order { min, max });
+        }
+        let smooth = grading.smooth.unwrap_or(max);
+        if !(smooth.is_finite() && smooth >= 0.0) {
+            return Err(DistanceError::Smooth { value: smooth });
+        }
+        let nodes = coarse_grid(grid, 0.5 * min);
+        let mut values = reduce(potential, grid, &nodes, Take::Mean);
+        values.iter_mut().for_each(|b| *b = b.abs());
+        gaussian(&mut values, nodes.shape, nodes.step.map(|step| smooth / step));
+        let (sparse, dense) = density_range(&values);
+        let scale = if dense > sparse { (max - min) / f64::from(dense - sparse) } else { 0.0 };
+        for v in &mut values {
+            let distance = max - f64::from(*v - sparse) * scale;
+            *v = distance.clamp(min, max) as f32;
+        }
+        limit_gradient(&mut values, nodes.shape, nodes.step, gradient_limit);
+        Ok(Self::new(nodes, values, grid))
+    }
+
+    /// d as the user gives it at every sample, lowered where its slope exceeds `gradient_limit`.
+    ///
+    /// A node takes the least of the samples around it, so that d is nowhere above the field.
+    ///
+    /// # Errors
+    /// [`DistanceError::FieldShape`], [`DistanceError::FieldValue`], [`DistanceError::BelowStep`],
+    /// [`DistanceError::GradientLimit`].
+    pub fn from_field(
+        grid: &Grid<D>,
+        field: &[f32],
+        gradient_limit: f64,
+    ) -> Result<Self, DistanceError> {
+        check_count(grid, field.len())?;
+        check_limit(gradient_limit)?;
+        if let Some(index) = field.iter().position(|d| !(d.is_finite() && *d > 0.0)) {
+            return Err(DistanceError::FieldValue { index, value: field[index] });
+        }
+        let least = field.iter().copied().fold(f32::INFINITY, f32::min).into();
+        check_step(grid, least)?;
+        let nodes = coarse_grid(grid, 0.5 * least);
+        let mut values = reduce(field, grid, &nodes, Take::Least);
+        limit_gradient(&mut values, nodes.shape, nodes.step, gradient_limit);
+        Ok(Self::new(nodes, values, grid))
+    }
+
+    fn new(nodes: Grid<D>, values: Vec<f32>, grid: &Grid<D>) -> Self {
+        let least = values.iter().copied().fold(f32::INFINITY, f32::min).into();
+        let greatest = values.iter().copied().fold(0.0, f32::max).into();
+        let constant = least == greatest;
+        Self {
+            inverse_step: nodes.step.map(f64::recip),
+            nodes: if constant { Grid { shape: [1; D], step: nodes.step } } else { nodes },
+            values: if constant { Vec::new() } else { values },
+            measure: grid.bounds().measure(),
+            least,
+            greatest,
+        }
+    }
+
+    /// d at a point; outside the box, d at the nearest point of the box.
+    #[inline]
+    pub fn at(&self, p: &Point<D>) -> f64 {
+        if self.values.is_empty() {
+            return self.least;
+        }
+        let (mut base, mut stride) = (0, 1);
+        let mut next = [0; D];
+        let mut share = [0.0; D];
+        for k in 0..D {
+            let last = self.nodes.shape[k] - 1;
+            let u = (p[k] * self.inverse_step[k]).clamp(0.0, last as f64);
+            let i = (u as usize).min(last.saturating_sub(1));
+            share[k] = u - i as f64;
+            base += i * stride;
+            next[k] = if last > 0 { stride } else { 0 };
+            stride *= self.nodes.shape[k];
+        }
+        let mut sum = 0.0;
+        for corner in 0..1 << D {
+            let (mut weight, mut index) = (1.0, base);
+            for k in 0..D {
+                if corner >> k & 1 == 1 {
+                    weight *= share[k];
+                    index += next[k];
+                } else {
+                    weight *= 1.0 - share[k];
+                }
+            }
+            sum += weight * f64::from(self.values[index]);
+        }
+        sum
+    }
+
+    /// The least d anywhere.
+    pub fn least(&self) -> f64 {
+        self.least
+    }
+
+    /// The greatest d anywhere.
+    pub fn greatest(&self) -> f64 {
+        self.greatest
+    }
+
+    /// Whether d is the same everywhere.
+    pub fn is_constant(&self) -> bool {
+        self.values.is_empty()
+    }
+
+    /// The mean of d over the box.
+    pub fn mean(&self) -> f64 {
+        self.average(|d| d)
+    }
+
+    /// About how many atoms fill the box: the integral of `density` / d^D, without the atoms that
+    /// the boundary takes beyond that.
+    ///
+    /// `density` is the crystal's number of atoms per d^D: 2/√3 for hexagonal, √2 for FCC, 3√3/4
+    /// for BCC.
+    pub fn estimated_atoms(&self, density: f64) -> f64 {
+        self.measure * self.average(|d| density / d.powi(D as i32))
+    }
+
+    /// The mean of a function of d over the box, by the trapezoidal rule.
+    fn average(&self, f: impl Fn(f64) -> f64) -> f64 {
+        if self.values.is_empty() {
+            return f(self.least);
+        }
+        let shape = self.nodes.shape;
+        let (mut sum, mut weights) = (0.0, 0.0);
+        for (r, row) in self.values.chunks_exact(shape[0]).enumerate() {
+            let (mut rest, mut across) = (r, 1.0);
+            for &n in &shape[1..] {
+                across *= trapezoid(rest % n, n);
+                rest /= n;
+            }
+            for (x, &d) in row.iter().enumerate() {
+                let weight = across * trapezoid(x, shape[0]);
+                sum += weight * f(d.into());
+                weights += weight;
+            }
+        }
+        sum / weights
+    }
+}
+
+/// A tidy constant distance for an image of which nothing else is known, in lattice units.
+///
+/// About 1,500 hexagonal atoms in the plane, 50,000 BCC atoms in space, give or take a half; the
+/// digits are 1, 1.2, 1.5, 2, 2.5, 3, 4, 5, 6 or 8. At least twice the least step, also where
+/// that gives fewer atoms. For Hale's 256 × 256 samples it is his 8.
+///
+/// ```
+/// let grid = atomesh::image::Grid { shape: [256, 256], step: [1.0, 1.0] };
+/// assert_eq!(atomesh::distance::default_distance(&grid), 8.0);
+/// ```
+pub fn default_distance<const D: usize>(grid: &Grid<D>) -> f64 {
+    let per_atom = if D <= 2 { 2.0 / 3f64.sqrt() / 1_500.0 } else { 0.75 * 3f64.sqrt() / 50_000.0 };
+    // logarithms, lest the product overflows; an axis of one sample is a step thick
+    let extent = grid.bounds().extent();
+    let log_measure: f64 = (0..D).map(|k| extent[k].max(grid.step[k]).ln()).sum();
+    let distance = ((log_measure + f64::ln(per_atom)) / D as f64).exp();
+    tidy(distance).max(2.0 * grid.least_step())
+}
+
+/// The nearest number of few digits, by ratio.
+fn tidy(value: f64) -> f64 {
+    const DIGITS: [f64; 11] = [1.0, 1.2, 1.5, 2.0, 2.5, 3.0, 4.0, 5.0, 6.0, 8.0, 10.0];
+    let exponent = value.log10().floor() as i32;
+    // powers of ten below 1 are not exact: divide by those above
+    let power = 10f64.powi(exponent.abs());
+    let scaled = |digit: f64| if exponent < 0 { digit / power } else { digit * power };
+    let unlike = |digit: f64| (scaled(digit) / value).ln().abs();
+    let nearest = DIGITS.into_iter().min_by(|&a, &b| unlike(a).total_cmp(&unlike(b)));
+    scaled(nearest.unwrap_or(1.0))
+}
+
+/// The weight of node `i` of `n` in the trapezoidal rule.
+fn trapezoid(i: usize, n: usize) -> f64 {
+    if n > 1 && (i == 0 || i + 1 == n) { 0.5 } else { 1.0 }
+}
+
+/// The least density of features, and the one that only the densest share of nodes exceeds.
+fn density_range(densities: &[f32]) -> (f32, f32) {
+    let least = densities.iter().copied().fold(f32::INFINITY, f32::min);
+    let mut order = densities.to_vec();
+    let rank = ((1.0 - DENSEST) * (order.len() - 1) as f64) as usize;
+    let (_, &mut dense, _) = order.select_nth_unstable_by(rank, f32::total_cmp);
+    (least, dense)
+}
+
+fn check_count<const D: usize>(grid: &Grid<D>, found: usize) -> Result<(), DistanceError> {
+    if found == grid.sample_count() {
+        Ok(())
+    } else {
+        Err(DistanceError::FieldShape { shape: grid.shape.to_vec(), found })
+    }
+}
+
+fn check_length(value: f64) -> Result<(), DistanceError> {
+    if value.is_finite() && value > 0.0 {
+        Ok(())
+    } else {
+        Err(DistanceError::NotPositive { value })
+    }
+}
+
+fn check_step<const D: usize>(grid: &Grid<D>, value: f64) -> Result<(), DistanceError> {
+    let step = grid.least_step();
+    if value < step { Err(DistanceError::BelowStep { value, step }) } else { Ok(()) }
+}
+
+fn check_limit(value: f64) -> Result<(), DistanceError> {
+    if value.is_finite() && value > 0.0 {
+        Ok(())
+    } else {
+        Err(DistanceError::GradientLimit { value })
+    }
+}
+
+#[cfg(test)]
+mod tests;
