@@ -12,6 +12,7 @@ use crate::geometry::Point;
 use crate::image::{Grid, gaussian};
 use coarse::{Take, coarse_grid, reduce};
 use limit::limit_gradient;
+use rayon::prelude::*;
 use serde::{Deserialize, Serialize};
 
 /// Greatest slope of d where none is asked for, in lattice units of d per lattice unit of way.
@@ -120,6 +121,7 @@ pub struct NominalDistance<const D: usize> {
     measure: f64,
     least: f64,
     greatest: f64,
+    greatest_slope: f64,
 }
 
 impl<const D: usize> NominalDistance<D> {
@@ -137,6 +139,7 @@ impl<const D: usize> NominalDistance<D> {
             measure: grid.bounds().measure(),
             least: distance,
             greatest: distance,
+            greatest_slope: 0.0,
         })
     }
 
@@ -215,6 +218,7 @@ impl<const D: usize> NominalDistance<D> {
         let constant = least == greatest;
         Self {
             inverse_step: nodes.step.map(f64::recip),
+            greatest_slope: if constant { 0.0 } else { greatest_slope(&values, &nodes) },
             nodes: if constant { Grid { shape: [1; D], step: nodes.step } } else { nodes },
             values: if constant { Vec::new() } else { values },
             measure: grid.bounds().measure(),
@@ -226,9 +230,11 @@ impl<const D: usize> NominalDistance<D> {
     /// d at a point; outside the box, d at the nearest point of the box.
     #[inline]
     pub fn at(&self, p: &Point<D>) -> f64 {
-        if self.values.is_empty() {
-            return self.least;
-        }
+        if self.values.is_empty() { self.least } else { self.interpolate(p) }
+    }
+
+    #[inline]
+    fn interpolate(&self, p: &Point<D>) -> f64 {
         let (mut base, mut stride) = (0, 1);
         let mut next = [0; D];
         let mut share = [0.0; D];
@@ -265,6 +271,11 @@ impl<const D: usize> NominalDistance<D> {
     /// The greatest d anywhere.
     pub fn greatest(&self) -> f64 {
         self.greatest
+    }
+
+    /// A bound of |∇d|: |d(x) − d(y)| is at most this times |x − y|, for any points of the box.
+    pub fn greatest_slope(&self) -> f64 {
+        self.greatest_slope
     }
 
     /// Whether d is the same everywhere.
@@ -307,6 +318,38 @@ impl<const D: usize> NominalDistance<D> {
         }
         sum / weights
     }
+}
+
+/// The greatest slope of values interpolated linearly between nodes.
+///
+/// Within a cell the slope along an axis is a mean of the slopes of the edges along it.
+fn greatest_slope<const D: usize>(values: &[f32], nodes: &Grid<D>) -> f64 {
+    let cells = nodes.shape.map(|n| n.saturating_sub(1).max(1)); // an axis of one node is flat
+    let strides = nodes.strides();
+    let edge = |k: usize| if nodes.shape[k] > 1 { strides[k] } else { 0 };
+    let squared_of_row = |row: usize| {
+        let (mut rest, mut start) = (row, 0);
+        for k in 1..D {
+            start += rest % cells[k] * strides[k];
+            rest /= cells[k];
+        }
+        let mut squared = 0.0f64;
+        for first in start..start + cells[0] {
+            let mut cell = 0.0;
+            for k in 0..D {
+                let mut rise = 0.0f32;
+                for corner in (0..1 << D).filter(|corner| corner >> k & 1 == 0) {
+                    let from = first + (0..D).map(|j| (corner >> j & 1) * edge(j)).sum::<usize>();
+                    rise = rise.max((values[from + edge(k)] - values[from]).abs());
+                }
+                cell += (f64::from(rise) / nodes.step[k]).powi(2);
+            }
+            squared = squared.max(cell);
+        }
+        squared
+    };
+    let rows: usize = cells[1..].iter().product();
+    (0..rows).into_par_iter().map(squared_of_row).reduce(|| 0.0, f64::max).sqrt()
 }
 
 /// A tidy constant distance for an image of which nothing else is known, in lattice units.

@@ -1,4 +1,6 @@
 use super::*;
+use crate::geometry::distance_squared;
+use rand::{RngExt, SeedableRng};
 
 const SQUARE: Grid<2> = Grid { shape: [101, 81], step: [1.0, 1.0] };
 
@@ -170,4 +172,26 @@ fn a_box_of_one_sample_has_a_distance() {
     let field: Vec<f32> = (0..50).map(|i| 3.0 + i as f32).collect();
     let d = NominalDistance::from_field(&row, &field, 0.25).unwrap();
     assert!((d.at(&[0.0, 40.0]) - 13.0).abs() < 1e-3);
+}
+
+#[test]
+fn no_two_points_differ_by_more_than_the_greatest_slope() {
+    let grid = Grid { shape: [12, 10, 8], step: [1.0, 0.8, 1.6] };
+    let mut random = rand_pcg::Pcg64Mcg::seed_from_u64(4);
+    let field: Vec<f32> =
+        (0..grid.sample_count()).map(|_| 2.0 + 3.0 * random.random::<f32>()).collect();
+    let d = NominalDistance::from_field(&grid, &field, 0.4).unwrap();
+    let extent = grid.bounds().extent();
+    let mut steepest = 0.0f64;
+    for _ in 0..20_000 {
+        let p: Point<3> = std::array::from_fn(|k| extent[k] * random.random::<f64>());
+        let q: Point<3> = std::array::from_fn(|k| p[k] + 0.02 * (random.random::<f64>() - 0.5));
+        let slope = (d.at(&p) - d.at(&q)).abs() / distance_squared(&p, &q).sqrt();
+        steepest = steepest.max(slope);
+    }
+    let bound = d.greatest_slope();
+    assert!(steepest <= bound && steepest > 0.8 * bound, "{steepest} of {bound}");
+    assert!(bound < 0.4 * 3f64.sqrt() + 1e-3, "{bound}");
+    let flat = NominalDistance::constant(&grid, 3.0).unwrap();
+    assert_eq!(flat.greatest_slope(), 0.0);
 }
