@@ -6,7 +6,12 @@
 //! sample 0 is at 0 and the box reaches to `(n − 1) · step`.
 
 mod bounds;
+mod order;
+mod predicates;
+mod simplex;
 pub use bounds::Bounds;
+pub use order::{hilbert_order, lexicographic};
+pub use simplex::Simplex;
 
 /// A point, or a vector, in `D` dimensions: x, y (and z).
 pub type Point<const D: usize> = [f64; D];

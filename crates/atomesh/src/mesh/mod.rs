@@ -1,5 +1,14 @@
 //! Triangle and tetrahedral meshes, and how points are connected to make them.
 
+mod delaunay;
+mod facets;
+mod validate;
+
+use crate::geometry::Simplex;
+pub use delaunay::{ConnectError, Delaunay, merge_duplicates};
+pub use facets::Facet;
+pub use validate::MeshFault;
+
 /// What is wrong with a mesh's parts.
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]
 #[non_exhaustive]
@@ -89,6 +98,35 @@ impl<const D: usize> Mesh<D> {
     /// The number of cells.
     pub fn cell_count(&self) -> usize {
         self.corners.len() / Self::CORNERS
+    }
+
+    /// A cell, given as its corners, with the coordinates of its points.
+    ///
+    /// # Panics
+    /// If `cell` has other than `D + 1` corners, or names points that the mesh has not.
+    pub fn simplex(&self, cell: &[u32]) -> Simplex<D> {
+        assert_eq!(cell.len(), Self::CORNERS, "a cell has D + 1 corners");
+        let at = |k: usize| self.points[cell[k] as usize];
+        Simplex { first: at(0), others: std::array::from_fn(|k| at(k + 1)) }
+    }
+
+    /// The cells with the coordinates of their points.
+    pub fn simplices(&self) -> impl ExactSizeIterator<Item = Simplex<D>> + '_ {
+        self.cells().map(|cell| self.simplex(cell))
+    }
+
+    /// The sum of the cells' areas (2-D) or volumes (3-D), added with compensation (Neumaier 1974):
+    /// the rounding error does not grow with the number of cells.
+    pub fn measure(&self) -> f64 {
+        let (mut sum, mut lost) = (0.0_f64, 0.0);
+        for simplex in self.simplices() {
+            let term = simplex.measure();
+            let total = sum + term;
+            let (large, small) = if sum.abs() >= term.abs() { (sum, term) } else { (term, sum) };
+            lost += (large - total) + small;
+            sum = total;
+        }
+        sum + lost
     }
 
     /// The points and the corners.

@@ -1,0 +1,39 @@
+//! Exact signs of orientation and in-sphere determinants, by adaptive precision arithmetic
+//! (Shewchuk 1997, crate `robust`).
+//!
+//! The crate has one function a dimension; this is where they become one. Exact as long as no
+//! product under- or overflows: coordinates and their differences within about 1e±60.
+
+use super::{Point, simplex::Simplex};
+use robust::{Coord, Coord3D, incircle, insphere, orient2d, orient3d};
+
+fn flat<const D: usize>(p: &Point<D>) -> Coord<f64> {
+    Coord { x: p[0], y: p[1] }
+}
+
+fn solid<const D: usize>(p: &Point<D>) -> Coord3D<f64> {
+    Coord3D { x: p[0], y: p[1], z: p[2] }
+}
+
+/// See [`Simplex::orientation`].
+pub(super) fn orientation<const D: usize>(simplex: &Simplex<D>) -> f64 {
+    const { assert!(D == 2 || D == 3) };
+    let (a, o) = (&simplex.first, &simplex.others);
+    if D == 2 {
+        orient2d(flat(a), flat(&o[0]), flat(&o[1]))
+    } else {
+        // Shewchuk's sign is that of a left-handed tetrahedron.
+        -orient3d(solid(a), solid(&o[0]), solid(&o[1]), solid(&o[2]))
+    }
+}
+
+/// See [`Simplex::in_sphere`].
+pub(super) fn in_sphere<const D: usize>(simplex: &Simplex<D>, p: &Point<D>) -> f64 {
+    const { assert!(D == 2 || D == 3) };
+    let (a, o) = (&simplex.first, &simplex.others);
+    if D == 2 {
+        incircle(flat(a), flat(&o[0]), flat(&o[1]), flat(p))
+    } else {
+        -insphere(solid(a), solid(&o[0]), solid(&o[1]), solid(&o[2]), solid(p))
+    }
+}

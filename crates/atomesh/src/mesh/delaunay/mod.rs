@@ -1,0 +1,166 @@
+//! Connecting points by Delaunay's rule: no point lies inside the circumsphere of a cell.
+//!
+//! The points are checked, scaled by a power of two, which is exact, and put along a Hilbert curve;
+//! a connector that knows its dimension makes the cells; the cells are put in a canonical order.
+//! Nothing depends on threads, and the cells do not depend on the order of the points either.
+//!
+//! In 3-D, points on a common sphere, as in every perfect crystal, leave the choice of cells open.
+//! It is made as if each point's lift |x|² were raised by an infinitesimal amount, larger by orders
+//! for points later in lexicographic order (Devillers & Teillaud 2011). The result is valid, has no
+//! cell without volume, and is the same however the points are numbered.
+
+mod canonical;
+mod plane;
+mod prepare;
+mod space;
+#[cfg(test)]
+mod tests;
+
+use super::{Mesh, MeshError};
+use crate::geometry::Point;
+use crate::watch::{Cancelled, Phase, Watch, check};
+
+use prepare::Prepared;
+pub use prepare::merge_duplicates;
+
+/// Why points were not connected.
+#[derive(Clone, Debug, PartialEq, thiserror::Error)]
+#[non_exhaustive]
+pub enum ConnectError {
+    /// Fewer points than one cell has corners.
+    #[error("{count} points cannot be connected; expected at least {least}")]
+    TooFew {
+        /// How many there are.
+        count: usize,
+        /// The corners of one cell.
+        least: usize,
+    },
+    /// More points than indices of 32 bits can serve.
+    #[error("{count} points are too many; expected at most {most}")]
+    TooMany {
+        /// How many there are.
+        count: usize,
+        /// How many there may be.
+        most: usize,
+    },
+    /// A coordinate is not finite.
+    #[error("point {point} has the coordinate {value} along axis {axis}; expected a finite number")]
+    Coordinate {
+        /// The point's index.
+        point: usize,
+        /// 0 for x, 1 for y, 2 for z.
+        axis: usize,
+        /// The coordinate found.
+        value: f64,
+    },
+    /// A coordinate is too near zero, beside the others, for exact arithmetic.
+    #[error(
+        "point {point} has the coordinate {value:e} along axis {axis}; \
+         expected 0 or a magnitude of at least {least:e}, 2^-140 of the largest"
+    )]
+    TooSmall {
+        /// The point's index.
+        point: usize,
+        /// 0 for x, 1 for y, 2 for z.
+        axis: usize,
+        /// The coordinate found.
+        value: f64,
+        /// The least magnitude that is not 0.
+        least: f64,
+    },
+    /// Two points are equal.
+    #[error("points {first} and {second} are equal; expected distinct points")]
+    Duplicate {
+        /// The lower index.
+        first: usize,
+        /// The higher index.
+        second: usize,
+    },
+    /// All points lie on one line (2-D) or one plane (3-D).
+    #[error("all {count} points lie on one {}; they have no cells", if *.dimension == 2 { "line" } else { "plane" })]
+    Flat {
+        /// How many points there are.
+        count: usize,
+        /// The dimension of their space.
+        dimension: usize,
+    },
+    /// The work was ended by its watch.
+    #[error(transparent)]
+    Cancelled(#[from] Cancelled),
+    /// The cells do not make a mesh.
+    #[error(transparent)]
+    Mesh(#[from] MeshError),
+}
+
+/// The most points that can be connected: the cells' facets are numbered by 32 bits.
+const MOST_POINTS: usize = 1 << 27;
+
+/// Makes cells of prepared points; `None` if all lie on one line (2-D) or plane (3-D).
+///
+/// Returns the corners, ranks in the prepared order, `D + 1` a cell, in any order and orientation
+/// positive.
+type Connector<const D: usize> =
+    fn(&[Point<D>], &mut dyn Watch) -> Result<Option<Vec<u32>>, Cancelled>;
+
+/// Connects points to a [`Mesh`] by Delaunay's rule.
+#[derive(Clone, Copy, Debug)]
+pub struct Delaunay<const D: usize> {
+    connector: Connector<D>,
+}
+
+impl Delaunay<2> {
+    /// Triangles, by the crate `spade`.
+    pub fn new() -> Self {
+        Self { connector: plane::connect }
+    }
+}
+
+impl Delaunay<3> {
+    /// Tetrahedra, by incremental insertion (Bowyer 1981, Watson 1981).
+    pub fn new() -> Self {
+        Self { connector: space::connect }
+    }
+}
+
+impl Default for Delaunay<2> {
+    fn default() -> Self {
+        Self::new()
+    }
+}
+
+impl Default for Delaunay<3> {
+    fn default() -> Self {
+        Self::new()
+    }
+}
+
+impl<const D: usize> Delaunay<D> {
+    /// Connects all `points`; the mesh has the same points in the same order.
+    ///
+    /// The cells fill the convex hull. Each has positive orientation by exact arithmetic and no
+    /// point inside its circumsphere. Its corners are in ascending order but for the last two, which
+    /// follow from the orientation; the cells are in lexicographic order of their corners.
+    ///
+    /// Reports [`Phase::Connect`] to `watch`. Cost: about O(n log n) for points of limited crowding.
+    ///
+    /// # Errors
+    /// [`ConnectError`] if points are too few, too many, equal, on one line or plane, or have a
+    /// coordinate that is not finite; or if `watch` ends the work.
+    pub fn connect(
+        &self,
+        points: &[Point<D>],
+        watch: &mut dyn Watch,
+    ) -> Result<Mesh<D>, ConnectError> {
+        check(watch, Phase::Connect, 0.0, None)?;
+        let prepared = Prepared::new(points)?;
+        let mut corners = (self.connector)(&prepared.points, watch)?
+            .ok_or(ConnectError::Flat { count: points.len(), dimension: D })?;
+        for corner in &mut corners {
+            *corner = prepared.order[*corner as usize];
+        }
+        drop(prepared);
+        check(watch, Phase::Connect, 1.0, None)?;
+        let corners = canonical::arrange(corners, D + 1, points.len());
+        Ok(Mesh::new(points.to_vec(), corners)?)
+    }
+}

@@ -1,0 +1,57 @@
+//! The cells in conflict with a point.
+
+use super::Triangulation;
+use super::storage::{Mark, Tetrahedron};
+use crate::geometry::Point;
+
+impl Triangulation {
+    /// Finds all cells in conflict with the vertex, from the one that holds it, and the facets
+    /// around them.
+    pub(super) fn dig(&mut self, vertex: u32, holder: u32) {
+        let p = self.vertices[vertex as usize].at;
+        self.boundary.clear();
+        self.cavity.clear();
+        self.cavity.push(holder);
+        debug_assert!(self.conflicts(&self.tetrahedra.cells[holder as usize], &p));
+        self.tetrahedra.marks[holder as usize] = Mark::Conflict;
+        let mut next = 0;
+        while let Some(&cell) = self.cavity.get(next) {
+            next += 1;
+            for facet in self.tetrahedra.cells[cell as usize].neighbours {
+                let neighbour = (facet >> 2) as usize;
+                match self.tetrahedra.marks[neighbour] {
+                    Mark::Conflict => {}
+                    Mark::Kept => self.boundary.push(facet),
+                    _ if self.conflicts(&self.tetrahedra.cells[neighbour], &p) => {
+                        self.tetrahedra.marks[neighbour] = Mark::Conflict;
+                        self.cavity.push(neighbour as u32);
+                    }
+                    _ => {
+                        self.tetrahedra.marks[neighbour] = Mark::Kept;
+                        self.boundary.push(facet);
+                    }
+                }
+            }
+        }
+    }
+
+    /// Whether the circumsphere of the cell holds `p`. That of an infinite cell is the open half
+    /// space beyond its facet and, in the facet's plane, the circle around it: the circle that the
+    /// plane cuts from the circumsphere of the finite cell behind, perturbed or not.
+    fn conflicts(&self, cell: &Tetrahedron, p: &Point<3>) -> bool {
+        let at = |k: usize| &self.vertices[cell.corners[k] as usize].at;
+        if !cell.is_infinite() {
+            return self.predicates.in_sphere([at(0), at(1), at(2), at(3)], p);
+        }
+        let side = self.predicates.orientation([at(0), at(1), at(2), p]);
+        if side != 0.0 {
+            return side > 0.0;
+        }
+        let behind = (cell.neighbours[3] >> 2) as usize;
+        match self.tetrahedra.marks[behind] {
+            Mark::Conflict => true,
+            Mark::Kept => false,
+            _ => self.conflicts(&self.tetrahedra.cells[behind], p),
+        }
+    }
+}

@@ -1,0 +1,112 @@
+//! Signs of determinants: filtered, exact, and perturbed where exactly zero.
+//!
+//! The filter is static: one bound on the rounding error for the whole box of points, from the error
+//! analysis of Shewchuk (1997), whose order of operations is kept.
+
+use crate::geometry::{Point, lexicographic};
+use robust::{Coord3D, insphere, orient3d};
+
+/// Half a unit in the last place of 1.
+const ROUNDING: f64 = f64::EPSILON / 2.0;
+
+/// The error bounds for points in one box.
+pub(super) struct Predicates {
+    orientation_bound: f64,
+    in_sphere_bound: f64,
+}
+
+impl Predicates {
+    /// For points in a box of these lengths.
+    pub fn new(extent: Point<3>) -> Self {
+        let volume = extent[0] * extent[1] * extent[2];
+        let lift = extent[0] * extent[0] + extent[1] * extent[1] + extent[2] * extent[2];
+        // Shewchuk's bounds are (7 + 56ε)ε and (16 + 224ε)ε times the permanent: with every
+        // difference as large as the box, 6 products of three, and 24 of these times a lift.
+        Self {
+            orientation_bound: 8.0 * ROUNDING * 6.0 * volume,
+            in_sphere_bound: 17.0 * ROUNDING * 24.0 * volume * lift,
+        }
+    }
+
+    /// Has the sign of the volume of a, b, c, d.
+    #[inline]
+    pub fn orientation(&self, [a, b, c, d]: [&Point<3>; 4]) -> f64 {
+        let (x, y, z) = (minus(a, d), minus(b, d), minus(c, d));
+        let rounded = x[2] * (z[0] * y[1] - y[0] * z[1])
+            + y[2] * (x[0] * z[1] - z[0] * x[1])
+            + z[2] * (y[0] * x[1] - x[0] * y[1]);
+        if rounded.abs() > self.orientation_bound {
+            return rounded;
+        }
+        exact_orientation([a, b, c, d])
+    }
+
+    /// Whether `p`, no corner of the cell, is inside the circumsphere of a positive cell.
+    #[inline]
+    pub fn in_sphere(&self, cell: [&Point<3>; 4], p: &Point<3>) -> bool {
+        let rounded = rounded_in_sphere(cell, p);
+        if rounded.abs() > self.in_sphere_bound { rounded > 0.0 } else { exact_in_sphere(cell, p) }
+    }
+}
+
+#[inline(always)]
+fn minus(a: &Point<3>, b: &Point<3>) -> Point<3> {
+    [a[0] - b[0], a[1] - b[1], a[2] - b[2]]
+}
+
+#[inline(always)]
+fn rounded_in_sphere(cell: [&Point<3>; 4], p: &Point<3>) -> f64 {
+    let [a, b, c, d] = cell.map(|corner| minus(corner, p));
+    let minor = |u: &Point<3>, v: &Point<3>| u[0] * v[1] - v[0] * u[1];
+    let (ab, bc, cd) = (minor(&a, &b), minor(&b, &c), minor(&c, &d));
+    let (da, ac, bd) = (minor(&d, &a), minor(&a, &c), minor(&b, &d));
+    let abc = a[2] * bc - b[2] * ac + c[2] * ab;
+    let bcd = b[2] * cd - c[2] * bd + d[2] * bc;
+    let cda = c[2] * da + d[2] * ac + a[2] * cd;
+    let dab = d[2] * ab + a[2] * bd + b[2] * da;
+    let lift = |u: &Point<3>| u[0] * u[0] + u[1] * u[1] + u[2] * u[2];
+    // The negative of Shewchuk's: his positive tetrahedra are left-handed.
+    (lift(&c) * dab - lift(&d) * abc) + (lift(&a) * bcd - lift(&b) * cda)
+}
+
+fn coordinates(p: &Point<3>) -> Coord3D<f64> {
+    Coord3D { x: p[0], y: p[1], z: p[2] }
+}
+
+#[cold]
+pub(super) fn exact_orientation(corners: [&Point<3>; 4]) -> f64 {
+    let [a, b, c, d] = corners.map(coordinates);
+    -orient3d(a, b, c, d)
+}
+
+#[cold]
+fn exact_in_sphere(cell: [&Point<3>; 4], p: &Point<3>) -> bool {
+    let [a, b, c, d] = cell.map(coordinates);
+    let sign = -insphere(a, b, c, d, coordinates(p));
+    if sign == 0.0 { perturbed_in_sphere(cell, p) } else { sign > 0.0 }
+}
+
+/// Whether `p` is inside the circumsphere of the cell, all five on one sphere, after the lift of each
+/// point is raised by an infinitesimal amount, larger by orders for lexicographically later points
+/// (Devillers & Teillaud 2011).
+///
+/// The lifted sphere through the cell is a hyperplane. Raising `p` puts it above, outside. Raising
+/// corner k raises the hyperplane at `p` by the corner's barycentric weight there, which has the sign
+/// of the orientation of the cell with `p` in place of the corner. The latest point whose raise
+/// matters decides; that of `p` does, so the search ends.
+fn perturbed_in_sphere(cell: [&Point<3>; 4], p: &Point<3>) -> bool {
+    let mut latest_first = [0, 1, 2, 3];
+    latest_first.sort_unstable_by(|&i, &j| lexicographic(cell[j], cell[i]));
+    for corner in latest_first {
+        if lexicographic(p, cell[corner]).is_gt() {
+            return false;
+        }
+        let mut replaced = cell;
+        replaced[corner] = p;
+        let weight = exact_orientation(replaced);
+        if weight != 0.0 {
+            return weight > 0.0;
+        }
+    }
+    false
+}
