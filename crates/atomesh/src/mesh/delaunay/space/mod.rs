@@ -16,6 +16,7 @@
 
 mod cavity;
 mod fill;
+mod fixed;
 mod locate;
 mod predicates;
 mod rounds;

@@ -3,6 +3,7 @@
 //! The filter is static: one bound on the rounding error for the whole box of points, from the error
 //! analysis of Shewchuk (1997), whose order of operations is kept.
 
+use super::fixed;
 use crate::geometry::{Point, lexicographic};
 use robust::{Coord3D, insphere, orient3d};
 
@@ -73,17 +74,23 @@ fn coordinates(p: &Point<3>) -> Coord3D<f64> {
     Coord3D { x: p[0], y: p[1], z: p[2] }
 }
 
+/// Has the sign of the volume of a, b, c, d, without a filter.
 #[cold]
 pub(super) fn exact_orientation(corners: [&Point<3>; 4]) -> f64 {
+    if let Some(sign) = fixed::orientation(corners) {
+        return f64::from(sign as i8);
+    }
     let [a, b, c, d] = corners.map(coordinates);
     -orient3d(a, b, c, d)
 }
 
 #[cold]
 fn exact_in_sphere(cell: [&Point<3>; 4], p: &Point<3>) -> bool {
-    let [a, b, c, d] = cell.map(coordinates);
-    let sign = -insphere(a, b, c, d, coordinates(p));
-    if sign == 0.0 { perturbed_in_sphere(cell, p) } else { sign > 0.0 }
+    let sign = fixed::in_sphere(cell, p).unwrap_or_else(|| {
+        let [a, b, c, d] = cell.map(coordinates);
+        0.0_f64.total_cmp(&(insphere(a, b, c, d, coordinates(p)) + 0.0))
+    });
+    if sign.is_eq() { perturbed_in_sphere(cell, p) } else { sign.is_gt() }
 }
 
 /// Whether `p` is inside the circumsphere of the cell, all five on one sphere, after the lift of each
