@@ -62,7 +62,7 @@ impl<const D: usize> Mesh<D> {
     /// [`MeshError`] if the corners do not divide into cells, name a missing point, or a
     /// coordinate is not finite.
     pub fn new(points: Vec<[f64; D]>, corners: Vec<u32>) -> Result<Self, MeshError> {
-        if corners.len() % Self::CORNERS != 0 {
+        if !corners.len().is_multiple_of(Self::CORNERS) {
             return Err(MeshError::CornerCount { count: corners.len(), each: Self::CORNERS });
         }
         for (point, p) in points.iter().enumerate() {

@@ -109,7 +109,7 @@ impl<const D: usize> Mesh<D> {
         let swaps: usize = (0..corners.len())
             .map(|k| corners[..k].iter().filter(|c| rank(c) > rank(&corners[k])).count())
             .sum();
-        swaps % 2 == 0
+        swaps.is_multiple_of(2)
     }
 
     /// Checks by exact arithmetic that across every facet the neighbour's corner is not inside the
