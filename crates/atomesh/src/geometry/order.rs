@@ -1,7 +1,7 @@
 //! Points along a Hilbert curve: what is near in memory is then near in space.
 //!
 //! The bounding cube of the points is cut into 2^b cells a side and the cells are numbered along the
-//! curve (Skilling 2004). Points of one cell follow each other in order of their coordinates, equal
+//! curve (Hamilton 2006). Points of one cell follow each other in order of their coordinates, equal
 //! points in order of their indices, so the order is total and depends on no thread count.
 //! Cost: O(n log n).
 
@@ -22,6 +22,7 @@ pub fn hilbert_order<const D: usize>(points: &[Point<D>]) -> Vec<u32> {
     let bits = KEY_BITS / D;
     let side = bounds.extent().into_iter().fold(0.0, f64::max);
     let cells = (1_u64 << bits) as f64;
+    let curve = HilbertCurve::<D>::new();
     let mut keyed: Vec<(u64, u32)> = points
         .par_iter()
         .enumerate()
@@ -30,7 +31,7 @@ pub fn hilbert_order<const D: usize>(points: &[Point<D>]) -> Vec<u32> {
                 let place = if side > 0.0 { (p[k] - bounds.min[k]) / side } else { 0.0 };
                 (place * cells).min(cells - 1.0) as u32
             });
-            (hilbert_key(cell, bits), index as u32)
+            (curve.key(cell, bits), index as u32)
         })
         .collect();
     keyed.par_sort_unstable_by(|a, b| {
@@ -54,34 +55,76 @@ pub fn lexicographic<const D: usize>(a: &Point<D>, b: &Point<D>) -> Ordering {
     Ordering::Equal
 }
 
-/// The number of a cell along the Hilbert curve of `2^bits` cells a side.
+/// The Hilbert curve as an automaton. A state is how the curve runs through the present cube; it
+/// tells where each of the 2^D halves along all axes comes, and in which state the curve is there.
 ///
-/// Source: J. Skilling, "Programming the Hilbert curve" (2004), its transform of axes.
-fn hilbert_key<const D: usize>(mut x: [u32; D], bits: usize) -> u64 {
-    for b in (1..bits).rev() {
-        let below = (1_u32 << b) - 1;
-        for k in 0..D {
-            // Inverts the low bits of x if bit b of x_k is set, else swaps them with those of x_k.
-            let set = 0_u32.wrapping_sub((x[k] >> b) & 1);
-            let swap = (x[0] ^ x[k]) & below & !set;
-            x[k] ^= swap;
-            x[0] ^= swap | (below & set);
+/// Source: C. Hamilton, "Compact Hilbert indices" (2006), sections 2 and 3, whose names are kept.
+struct HilbertCurve<const D: usize> {
+    /// For each state and half: the next state's first place in this table, times 2^D, plus the
+    /// place of the half along the curve.
+    steps: Vec<u16>,
+}
+
+impl<const D: usize> HilbertCurve<D> {
+    /// 2^D, the halves along all axes.
+    const HALVES: usize = 1 << D;
+
+    fn new() -> Self {
+        let mut steps = Vec::with_capacity(Self::HALVES * Self::HALVES * D);
+        // The state of entry e and direction d is number e · D + d.
+        for e in 0..Self::HALVES {
+            for d in 0..D {
+                for half in 0..Self::HALVES {
+                    let w = gray_inverse(rotate::<D>(half ^ e, 2 * D - d - 1));
+                    let next_e = e ^ rotate::<D>(entry(w), d + 1);
+                    let next_d = (d + direction(w) + 1) % D;
+                    steps.push(((next_e * D + next_d) * Self::HALVES * Self::HALVES + w) as u16);
+                }
+            }
         }
+        Self { steps }
     }
-    for k in 1..D {
-        x[k] ^= x[k - 1];
-    }
-    let mut flip = 0;
-    for b in 1..bits {
-        flip ^= ((1_u32 << b) - 1) & 0_u32.wrapping_sub((x[D - 1] >> b) & 1);
-    }
-    let mut key = 0;
-    for b in (0..bits).rev() {
-        for k in 0..D {
-            key = (key << 1) | u64::from(((x[k] ^ flip) >> b) & 1);
+
+    /// The number of a cell among the `2^bits` a side.
+    fn key(&self, cell: [u32; D], bits: usize) -> u64 {
+        let (mut key, mut state) = (0, 0);
+        for b in (0..bits).rev() {
+            let mut half = 0;
+            for k in 0..D {
+                half |= (cell[k] as usize >> b & 1) << k;
+            }
+            let step = usize::from(self.steps[state + half]);
+            key = key << D | (step % Self::HALVES) as u64;
+            state = step / Self::HALVES;
         }
+        key
     }
-    key
+}
+
+/// Rotates the lowest D bits to the left.
+fn rotate<const D: usize>(bits: usize, by: usize) -> usize {
+    let by = by % D;
+    (bits << by | bits >> (D - by)) & ((1 << D) - 1)
+}
+
+/// The number whose Gray code this is, for up to 4 bits.
+fn gray_inverse(code: usize) -> usize {
+    code ^ code >> 1 ^ code >> 2 ^ code >> 3
+}
+
+/// Where the curve enters the half that it visits as number `w`.
+fn entry(w: usize) -> usize {
+    let even = w.saturating_sub(1) & !1;
+    even ^ even >> 1
+}
+
+/// Along which axis the curve runs through the half that it visits as number `w`.
+fn direction(w: usize) -> usize {
+    match w {
+        0 => 0,
+        _ if w % 2 == 0 => (w - 1).trailing_ones() as usize,
+        _ => w.trailing_ones() as usize,
+    }
 }
 
 #[cfg(test)]
@@ -89,13 +132,14 @@ mod tests {
     use super::*;
 
     fn curve_is_a_walk_through_all_cells<const D: usize>(bits: usize) {
+        let curve = HilbertCurve::<D>::new();
         let side = 1_u32 << bits;
         let count = (side as usize).pow(D as u32);
         let mut cells = vec![None; count];
         for index in 0..count {
             let cell: [u32; D] =
                 std::array::from_fn(|k| (index / (side as usize).pow(k as u32)) as u32 % side);
-            cells[hilbert_key(cell, bits) as usize] = Some(cell);
+            cells[curve.key(cell, bits) as usize] = Some(cell);
         }
         let cells: Vec<[u32; D]> = cells.into_iter().map(Option::unwrap).collect();
         for pair in cells.windows(2) {

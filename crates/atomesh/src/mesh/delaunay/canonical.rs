@@ -2,66 +2,44 @@
 
 /// Sorts each cell's corners, keeping its orientation, and then the cells.
 ///
-/// `each` corners make a cell; they name points below `point_count`. Corners ascend but for the last
-/// two, which are swapped if the orientation needs it. Cost: O(n) for cells spread over the points.
-pub(super) fn arrange(mut corners: Vec<u32>, each: usize, point_count: usize) -> Vec<u32> {
+/// `N` corners make a cell; they are below `point_count`. Corners ascend but for the last two, which
+/// are swapped if the orientation needs it. Cost: O(n) for cells spread over the points.
+pub(super) fn arrange<const N: usize>(mut corners: Vec<u32>, point_count: usize) -> Vec<u32> {
     let mut starts = vec![0_usize; point_count + 1];
-    for cell in corners.chunks_exact_mut(each) {
+    for cell in corners.as_chunks_mut::<N>().0 {
         sort_evenly(cell);
-        starts[cell[0] as usize + 1] += each;
+        starts[cell[0] as usize + 1] += 1;
     }
     for point in 0..point_count {
         starts[point + 1] += starts[point];
     }
     let mut arranged = vec![0; corners.len()];
+    let cells = arranged.as_chunks_mut::<N>().0;
     let mut next = starts.clone();
-    for cell in corners.chunks_exact(each) {
+    for cell in corners.as_chunks::<N>().0 {
         let at = &mut next[cell[0] as usize];
-        arranged[*at..*at + each].copy_from_slice(cell);
-        *at += each;
+        cells[*at] = *cell;
+        *at += 1;
     }
-    drop(corners);
     for range in starts.windows(2) {
-        sort_rows(&mut arranged[range[0]..range[1]], each);
+        cells[range[0]..range[1]].sort_unstable();
     }
     arranged
 }
 
 /// Sorts by an even number of swaps: the last two corners end out of order if need be.
-fn sort_evenly(cell: &mut [u32]) {
+fn sort_evenly<const N: usize>(cell: &mut [u32; N]) {
     let mut odd = false;
-    for end in (1..cell.len()).rev() {
+    for end in (1..N).rev() {
         for k in 0..end {
-            if cell[k] > cell[k + 1] {
-                cell.swap(k, k + 1);
-                odd = !odd;
-            }
+            // Without a branch: which corner is lower is anyone's guess.
+            let (a, b) = (cell[k], cell[k + 1]);
+            (cell[k], cell[k + 1]) = (a.min(b), a.max(b));
+            odd ^= a > b;
         }
     }
     if odd {
-        let last = cell.len() - 1;
-        cell.swap(last - 1, last);
-    }
-}
-
-/// Sorts short rows; the few that share a first corner.
-fn sort_rows(rows: &mut [u32], each: usize) {
-    /// Up to this many rows, insertion is faster than a sort that allocates.
-    const FEW: usize = 48;
-    if rows.len() > FEW * each {
-        let mut sorted: Vec<&[u32]> = rows.chunks_exact(each).collect();
-        sorted.sort_unstable();
-        let sorted = sorted.concat();
-        rows.copy_from_slice(&sorted);
-        return;
-    }
-    for end in (each..rows.len()).step_by(each) {
-        let mut at = end;
-        while at > 0 && rows[at - each..at] > rows[at..at + each] {
-            let (left, right) = rows.split_at_mut(at);
-            left[at - each..].swap_with_slice(&mut right[..each]);
-            at -= each;
-        }
+        cell.swap(N - 2, N - 1);
     }
 }
 
@@ -69,28 +47,21 @@ fn sort_rows(rows: &mut [u32], each: usize) {
 mod tests {
     use super::*;
 
-    #[test]
-    fn even_sorting_keeps_the_orientation() {
-        let mut cell = [3, 1, 2];
+    fn evenly_sorted<const N: usize>(mut cell: [u32; N]) -> [u32; N] {
         sort_evenly(&mut cell);
-        assert_eq!(cell, [1, 2, 3]);
-        let mut cell = [3, 2, 1, 0];
-        sort_evenly(&mut cell);
-        assert_eq!(cell, [0, 1, 2, 3]);
-        let mut cell = [1, 0, 2, 3];
-        sort_evenly(&mut cell);
-        assert_eq!(cell, [0, 1, 3, 2]);
+        cell
     }
 
     #[test]
-    fn many_rows_and_few_rows_sort_alike() {
-        for count in [1_u32, 5, 200] {
-            let rows: Vec<u32> = (0..count).flat_map(|i| [0, 7919 * i % 1009, i]).collect();
-            let mut expected: Vec<Vec<u32>> = rows.chunks(3).map(<[u32]>::to_vec).collect();
-            expected.sort();
-            let mut sorted = rows;
-            sort_rows(&mut sorted, 3);
-            assert_eq!(sorted, expected.concat());
-        }
+    fn even_sorting_keeps_the_orientation() {
+        assert_eq!(evenly_sorted([3, 1, 2]), [1, 2, 3]);
+        assert_eq!(evenly_sorted([3, 2, 1, 0]), [0, 1, 2, 3]);
+        assert_eq!(evenly_sorted([1, 0, 2, 3]), [0, 1, 3, 2]);
+    }
+
+    #[test]
+    fn cells_come_out_in_order() {
+        let cells = vec![5, 2, 3, 0, 4, 1, 3, 2, 4, 1, 0, 2];
+        assert_eq!(arrange::<3>(cells, 6), [0, 2, 1, 0, 4, 1, 2, 3, 5, 2, 4, 3]);
     }
 }

@@ -106,19 +106,21 @@ type Connector<const D: usize> =
 #[derive(Clone, Copy, Debug)]
 pub struct Delaunay<const D: usize> {
     connector: Connector<D>,
+    /// [`canonical::arrange`] for cells of `D + 1` corners.
+    arrange: fn(Vec<u32>, usize) -> Vec<u32>,
 }
 
 impl Delaunay<2> {
     /// Triangles, by the crate `spade`.
     pub fn new() -> Self {
-        Self { connector: plane::connect }
+        Self { connector: plane::connect, arrange: canonical::arrange::<3> }
     }
 }
 
 impl Delaunay<3> {
     /// Tetrahedra, by incremental insertion (Bowyer 1981, Watson 1981).
     pub fn new() -> Self {
-        Self { connector: space::connect }
+        Self { connector: space::connect, arrange: canonical::arrange::<4> }
     }
 }
 
@@ -138,8 +140,10 @@ impl<const D: usize> Delaunay<D> {
     /// Connects all `points`; the mesh has the same points in the same order.
     ///
     /// The cells fill the convex hull. Each has positive orientation by exact arithmetic and no
-    /// point inside its circumsphere. Its corners are in ascending order but for the last two, which
-    /// follow from the orientation; the cells are in lexicographic order of their corners.
+    /// point inside its circumsphere. Its corners come in Hilbert order (see
+    /// [`crate::geometry::hilbert_order`]) but for the last two, which follow from the orientation;
+    /// the cells come in lexicographic order of their corners' places in it, so that cells near in
+    /// the list are near in space.
     ///
     /// Reports [`Phase::Connect`] to `watch`. Cost: about O(n log n) for points of limited crowding.
     ///
@@ -153,14 +157,13 @@ impl<const D: usize> Delaunay<D> {
     ) -> Result<Mesh<D>, ConnectError> {
         check(watch, Phase::Connect, 0.0, None)?;
         let prepared = Prepared::new(points)?;
-        let mut corners = (self.connector)(&prepared.points, watch)?
+        let corners = (self.connector)(&prepared.points, watch)?
             .ok_or(ConnectError::Flat { count: points.len(), dimension: D })?;
+        check(watch, Phase::Connect, 1.0, None)?;
+        let mut corners = (self.arrange)(corners, points.len());
         for corner in &mut corners {
             *corner = prepared.order[*corner as usize];
         }
-        drop(prepared);
-        check(watch, Phase::Connect, 1.0, None)?;
-        let corners = canonical::arrange(corners, D + 1, points.len());
         Ok(Mesh::new(points.to_vec(), corners)?)
     }
 }
