@@ -12,6 +12,7 @@
 mod canonical;
 mod plane;
 mod prepare;
+mod rounds;
 mod space;
 #[cfg(test)]
 mod tests;
@@ -94,6 +95,9 @@ pub enum ConnectError {
 
 /// The most points that can be connected: the cells' facets are numbered by 32 bits.
 const MOST_POINTS: usize = 1 << 27;
+
+/// Points inserted between two looks at the watch: some 10 ms.
+const STRIDE: usize = 4096;
 
 /// Makes cells of prepared points; `None` if all lie on one line (2-D) or plane (3-D).
 ///

@@ -5,6 +5,7 @@ use crate::watch::Silent;
 use proptest::prelude::*;
 use rand::{RngExt, SeedableRng};
 use rand_pcg::Pcg64Mcg;
+use std::ops::ControlFlow;
 
 fn scatter<const D: usize>(count: usize, seed: u64) -> Vec<Point<D>> {
     let mut random = Pcg64Mcg::seed_from_u64(seed);
@@ -243,27 +244,31 @@ fn signed_zeros_are_equal() {
     assert_eq!((unique.len(), map), (3, vec![0, 1, 2, 2]));
 }
 
-#[test]
-fn a_watch_ends_the_work() {
-    struct Stop(usize);
-    impl Watch for Stop {
-        fn step(&mut self, phase: Phase, done: f64, _: Option<f64>) -> std::ops::ControlFlow<()> {
-            assert_eq!(phase, Phase::Connect);
-            assert!((0.0..=1.0).contains(&done));
-            self.0 -= 1;
-            if self.0 == 0 {
-                std::ops::ControlFlow::Break(())
-            } else {
-                std::ops::ControlFlow::Continue(())
-            }
-        }
+/// Breaks at the call of this number.
+struct Stop(usize);
+
+impl Watch for Stop {
+    fn step(&mut self, phase: Phase, done: f64, _: Option<f64>) -> ControlFlow<()> {
+        assert_eq!(phase, Phase::Connect);
+        assert!((0.0..=1.0).contains(&done));
+        self.0 -= 1;
+        if self.0 == 0 { ControlFlow::Break(()) } else { ControlFlow::Continue(()) }
     }
-    let points = scatter::<3>(6000, 8);
-    for steps in 1..4 {
-        let found = Delaunay::<3>::new().connect(&points, &mut Stop(steps)).unwrap_err();
+}
+
+fn a_watch_ends_the_work<const D: usize>(delaunay: Delaunay<D>) {
+    let points = scatter::<D>(6000, 8);
+    for steps in 1..=4 {
+        let found = delaunay.connect(&points, &mut Stop(steps)).unwrap_err();
         assert_eq!(found, ConnectError::Cancelled(Cancelled));
     }
-    assert!(Delaunay::<3>::new().connect(&points, &mut Stop(100)).is_ok());
+    assert!(delaunay.connect(&points, &mut Stop(5)).is_ok());
+}
+
+#[test]
+fn a_watch_ends_the_work_in_2_d_and_3_d() {
+    a_watch_ends_the_work(Delaunay::<2>::new());
+    a_watch_ends_the_work(Delaunay::<3>::new());
 }
 
 /// Calls `visit` with all ways to take `D + 1` of `count`.

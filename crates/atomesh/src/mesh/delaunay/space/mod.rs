@@ -19,18 +19,15 @@ mod fill;
 mod fixed;
 mod locate;
 mod predicates;
-mod rounds;
 mod start;
 mod storage;
 
+use super::{STRIDE, rounds};
 use crate::geometry::{Bounds, Point};
 use crate::watch::{Cancelled, Phase, Watch, check};
 use fill::Rim;
 use predicates::Predicates;
 use storage::{Tetrahedra, Vertex};
-
-/// Points between two looks at the watch: some 10 ms.
-const STRIDE: usize = 4096;
 
 /// See [`super::Connector`].
 pub(super) fn connect(
