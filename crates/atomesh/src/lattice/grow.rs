@@ -7,7 +7,7 @@
 //! snapped to binary fractions, so that a perfect crystal stays perfect. Cost: O(atoms). Deterministic.
 
 use crate::distance::NominalDistance;
-use crate::geometry::{Bounds, Point};
+use crate::geometry::{Bounds, Point, distance_squared};
 use crate::watch::{Cancelled, Phase, Watch, check};
 
 use super::Lattice;
@@ -66,6 +66,9 @@ pub enum LatticeError {
         /// The greatest number of atoms.
         limit: usize,
     },
+    /// Scattered atoms could not be connected.
+    #[error("scattering: {0}")]
+    Connect(String),
     /// The caller ended the work.
     #[error(transparent)]
     Cancelled(#[from] Cancelled),
@@ -89,9 +92,19 @@ pub fn grow<const D: usize>(
     if !(0.1..=1.0).contains(&gamma) {
         return Err(LatticeError::SpacingFactor { value: gamma });
     }
-    let mut growth = Growth::new(crystal, bounds, distance, gamma)?;
-    growth.plant(&options.seed_points)?;
-    growth.edges();
+    let boundary = Boundary::new(bounds, distance)?;
+    let quantum = boundary.quantum;
+    let lattice = boundary.plant_and_divide(&options.seed_points)?;
+    let expected = distance.estimated_atoms(crystal.density());
+    if expected > ATOM_LIMIT as f64 {
+        return Err(LatticeError::TooMany { limit: ATOM_LIMIT });
+    }
+    let (least, greatest) = (gamma * distance.least(), gamma * distance.greatest());
+    let mut occupancy = Occupancy::new(bounds, least, greatest, expected as usize);
+    for p in lattice.atoms() {
+        occupancy.take(*p, gamma * distance.at(p));
+    }
+    let mut growth = Growth { lattice, occupancy, distance, gamma, quantum, expected };
     for face in 0..if D == 3 { 6 } else { 0 } {
         growth.face(face / 2, face % 2 == 1, watch)?;
     }
@@ -99,53 +112,58 @@ pub fn grow<const D: usize>(
     Ok(growth.lattice)
 }
 
-struct Growth<'a, const D: usize> {
+/// What any lattice starts from: the user's fixed atoms, the corners, and the edges of the box.
+pub(super) struct Boundary<'a, const D: usize> {
     lattice: Lattice<D>,
-    occupancy: Occupancy<D>,
     distance: &'a NominalDistance<D>,
-    gamma: f64,
     /// Coordinates are multiples of this power of two.
     quantum: f64,
-    expected: f64,
 }
 
-impl<'a, const D: usize> Growth<'a, D> {
-    fn new(
-        crystal: &Crystal<D>,
+impl<'a, const D: usize> Boundary<'a, D> {
+    pub(super) fn new(
         bounds: Bounds<D>,
         distance: &'a NominalDistance<D>,
-        gamma: f64,
     ) -> Result<Self, LatticeError> {
         let extent = bounds.extent();
         if let Some(axis) = (0..D).find(|&k| extent[k] <= 0.0) {
             return Err(LatticeError::Thin { axis });
         }
-        let expected = distance.estimated_atoms(crystal.density());
-        if expected > ATOM_LIMIT as f64 {
-            return Err(LatticeError::TooMany { limit: ATOM_LIMIT });
+        let quantum = 2f64.powi(distance.least().log2().floor() as i32 - 16);
+        Ok(Self { lattice: Lattice::empty(bounds), distance, quantum })
+    }
+
+    /// The user's fixed atoms, corners, and atoms along every edge of the box at even steps of ∫dx/d.
+    pub(super) fn plant_and_divide(
+        mut self,
+        seeds: &[Point<D>],
+    ) -> Result<Lattice<D>, LatticeError> {
+        self.plant(seeds)?;
+        let Bounds { min, max } = self.lattice.bounds;
+        let corner = |c: usize| -> Point<D> {
+            std::array::from_fn(|k| if c >> k & 1 == 1 { max[k] } else { min[k] })
+        };
+        for c in 0..1 << D {
+            if !self.lattice.atoms.contains(&corner(c)) {
+                self.lattice.push(corner(c), 0, 0.0);
+            }
         }
-        let (least, greatest) = (gamma * distance.least(), gamma * distance.greatest());
-        Ok(Self {
-            lattice: Lattice::empty(bounds),
-            occupancy: Occupancy::new(bounds, least, greatest, expected as usize),
-            distance,
-            gamma,
-            quantum: 2f64.powi(distance.least().log2().floor() as i32 - 16),
-            expected,
-        })
-    }
-
-    fn snap(&self, p: Point<D>) -> Point<D> {
-        p.map(|x| (x / self.quantum).round() * self.quantum)
-    }
-
-    fn add(&mut self, p: Point<D>, freedom: u8, temperature: f32) {
-        self.occupancy.take(p, self.gamma * self.distance.at(&p));
-        self.lattice.push(p, freedom, temperature);
-    }
-
-    fn is_free(&self, p: &Point<D>) -> bool {
-        self.occupancy.is_free(p, self.gamma * self.distance.at(p))
+        let given = seeds.len();
+        for axis in 0..D {
+            for c in (0..1 << D).filter(|c| c >> axis & 1 == 0) {
+                for x in even_steps(&corner(c), axis, max[axis], self.distance) {
+                    let mut p = corner(c);
+                    p[axis] = (x / self.quantum).round() * self.quantum;
+                    // only a fixed atom can be in the way
+                    let reach = 0.5 * self.distance.at(&p);
+                    let near = |q: &Point<D>| distance_squared(q, &p) < reach * reach;
+                    if !self.lattice.atoms[..given.min(self.lattice.len())].iter().any(near) {
+                        self.lattice.push(p, 1 << axis, 1.0);
+                    }
+                }
+            }
+        }
+        Ok(self.lattice)
     }
 
     /// The user's fixed atoms.
@@ -161,34 +179,34 @@ impl<'a, const D: usize> Growth<'a, D> {
                 });
             }
             if !self.lattice.atoms.contains(p) {
-                self.add(*p, 0, 0.0);
+                self.lattice.push(*p, 0, 0.0);
             }
         }
         Ok(())
     }
+}
 
-    /// Corners, and atoms along every edge of the box at even steps of ∫dx/d.
-    fn edges(&mut self) {
-        let Bounds { min, max } = self.lattice.bounds;
-        let corner = |c: usize| -> Point<D> {
-            std::array::from_fn(|k| if c >> k & 1 == 1 { max[k] } else { min[k] })
-        };
-        for c in 0..1 << D {
-            if !self.lattice.atoms.contains(&corner(c)) {
-                self.add(corner(c), 0, 0.0);
-            }
-        }
-        for axis in 0..D {
-            for c in (0..1 << D).filter(|c| c >> axis & 1 == 0) {
-                for x in even_steps(&corner(c), axis, max[axis], self.distance) {
-                    let mut p = corner(c);
-                    p[axis] = (x / self.quantum).round() * self.quantum;
-                    if self.is_free(&p) {
-                        self.add(p, 1 << axis, 1.0);
-                    }
-                }
-            }
-        }
+struct Growth<'a, const D: usize> {
+    lattice: Lattice<D>,
+    occupancy: Occupancy<D>,
+    distance: &'a NominalDistance<D>,
+    gamma: f64,
+    quantum: f64,
+    expected: f64,
+}
+
+impl<const D: usize> Growth<'_, D> {
+    fn snap(&self, p: Point<D>) -> Point<D> {
+        p.map(|x| (x / self.quantum).round() * self.quantum)
+    }
+
+    fn add(&mut self, p: Point<D>, freedom: u8, temperature: f32) {
+        self.occupancy.take(p, self.gamma * self.distance.at(&p));
+        self.lattice.push(p, freedom, temperature);
+    }
+
+    fn is_free(&self, p: &Point<D>) -> bool {
+        self.occupancy.is_free(p, self.gamma * self.distance.at(p))
     }
 
     /// One face of the box in 3-D, where `normal` is at its least or greatest.

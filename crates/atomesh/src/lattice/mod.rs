@@ -7,9 +7,11 @@
 mod crystal;
 mod grow;
 mod occupancy;
+mod scatter;
 
 pub use crystal::{Crystal, CrystalKind};
 pub use grow::{GrowOptions, LatticeError, grow};
+pub use scatter::{ScatterOptions, Scatterer, scatter};
 
 use crate::geometry::{Bounds, Point};
 

@@ -1,0 +1,132 @@
+//! What can go wrong, and what is odd enough to say.
+
+use crate::distance::DistanceError;
+use crate::enhance::EnhanceError;
+use crate::lattice::LatticeError;
+use crate::measure::MeasureError;
+use crate::mesh::ConnectError;
+use crate::optimize::OptimizeError;
+use crate::potential::PotentialError;
+use crate::watch::Cancelled;
+
+use super::options::LatticeKind;
+
+/// Why there is no mesh.
+#[derive(Clone, Debug, PartialEq, thiserror::Error)]
+#[non_exhaustive]
+pub enum PipelineError {
+    /// The image has one sample along an axis.
+    #[error("the image has 1 sample along {}; a mesh needs 2 or more along every axis", ["x", "y", "z"][*axis])]
+    Thin {
+        /// 0 for x, 1 for y, 2 for z.
+        axis: usize,
+    },
+    /// A lattice of another dimension.
+    #[error("lattice {} does not exist in {dimension}-D; choose {}", .kind.name(), if *.dimension == 2 { "hexagonal or random" } else { "bcc, fcc or random" })]
+    LatticeDimension {
+        /// The lattice asked for.
+        kind: LatticeKind,
+        /// The image's dimension.
+        dimension: usize,
+    },
+    /// A field of another shape than the image's.
+    #[error("the {name} has the shape {found:?}; the image has {expected:?} (x first)")]
+    Shape {
+        /// Which field.
+        name: &'static str,
+        /// The image's shape.
+        expected: Vec<usize>,
+        /// The field's shape.
+        found: Vec<usize>,
+    },
+    /// The work would not fit in memory.
+    #[error(
+        "about {} of memory needed, {} available; a nominal distance above {least}, --crop, or a \
+         coarser image would need less",
+        bytes(*.needed), bytes(*.available)
+    )]
+    Memory {
+        /// Bytes expected.
+        needed: u64,
+        /// Bytes allowed.
+        available: u64,
+        /// The least nominal distance of the run.
+        least: f64,
+    },
+    /// The potential could not be made.
+    #[error(transparent)]
+    Enhance(#[from] EnhanceError),
+    /// The potential or the weight is out of range.
+    #[error(transparent)]
+    Potential(#[from] PotentialError),
+    /// The nominal distance is out of range.
+    #[error(transparent)]
+    Distance(#[from] DistanceError),
+    /// The lattice could not be made.
+    #[error(transparent)]
+    Lattice(LatticeError),
+    /// The atoms could not be moved.
+    #[error(transparent)]
+    Optimize(OptimizeError),
+    /// The atoms could not be connected.
+    #[error(transparent)]
+    Connect(ConnectError),
+    /// The mesh could not be measured.
+    #[error(transparent)]
+    Measure(MeasureError),
+    /// The caller ended the work.
+    #[error(transparent)]
+    Cancelled(#[from] Cancelled),
+}
+
+impl PipelineError {
+    /// Whether the caller ended the work, in whichever phase.
+    pub fn is_cancelled(&self) -> bool {
+        matches!(
+            self,
+            Self::Cancelled(_)
+                | Self::Enhance(EnhanceError::Cancelled(_))
+                | Self::Lattice(LatticeError::Cancelled(_))
+                | Self::Optimize(OptimizeError::Cancelled(_))
+                | Self::Connect(ConnectError::Cancelled(_))
+                | Self::Measure(MeasureError::Cancelled(_))
+        )
+    }
+}
+
+macro_rules! from {
+    ($($error:ident => $variant:ident),*) => {
+        $(impl From<$error> for PipelineError {
+            fn from(error: $error) -> Self {
+                Self::$variant(error)
+            }
+        })*
+    };
+}
+from!(LatticeError => Lattice, OptimizeError => Optimize, ConnectError => Connect, MeasureError => Measure);
+
+/// What is odd but no error.
+#[derive(Clone, Debug, PartialEq, serde::Serialize, thiserror::Error)]
+#[serde(rename_all = "kebab-case")]
+#[non_exhaustive]
+pub enum Warning {
+    /// The image has no features of the kind asked for.
+    #[error("the image has no features of this kind: the mesh is regular")]
+    Constant,
+    /// d is larger than the box.
+    #[error("the nominal distance {distance} exceeds the box, {extent} along {}: the mesh is as coarse as can be", ["x", "y", "z"][*axis])]
+    Coarse {
+        /// 0 for x, 1 for y, 2 for z.
+        axis: usize,
+        /// The least nominal distance.
+        distance: f64,
+        /// The box along the axis.
+        extent: f64,
+    },
+}
+
+/// A number of bytes for people.
+fn bytes(count: u64) -> String {
+    let mib = count as f64 / (1 << 20) as f64;
+    if mib < 1024.0 { format!("{mib:.0} MiB") } else { format!("{:.1} GiB", mib / 1024.0) }
+}

@@ -1,0 +1,71 @@
+//! What differs between 2-D and 3-D, as a value.
+
+use crate::lattice::{Crystal, Scatterer};
+use crate::mesh::Delaunay;
+
+use super::error::PipelineError;
+use super::options::LatticeKind;
+
+/// The crystals and the connector of one dimension.
+#[derive(Clone, Debug)]
+pub struct Method<const D: usize> {
+    /// The default first.
+    crystals: Vec<(LatticeKind, Crystal<D>)>,
+    delaunay: Delaunay<D>,
+    scatterer: Scatterer<D>,
+}
+
+impl Method<2> {
+    /// Triangles from a hexagonal or random lattice.
+    pub fn flat() -> Self {
+        Self {
+            crystals: vec![(LatticeKind::Hexagonal, Crystal::hexagonal())],
+            delaunay: Delaunay::<2>::new(),
+            scatterer: Scatterer::<2>::new(),
+        }
+    }
+}
+
+impl Method<3> {
+    /// Tetrahedra from a body-centred, face-centred or random lattice.
+    pub fn volume() -> Self {
+        Self {
+            crystals: vec![
+                (LatticeKind::Bcc, Crystal::body_centered_cubic()),
+                (LatticeKind::Fcc, Crystal::face_centered_cubic()),
+            ],
+            delaunay: Delaunay::<3>::new(),
+            scatterer: Scatterer::<3>::new(),
+        }
+    }
+}
+
+impl<const D: usize> Method<D> {
+    /// The crystal of that name; `None` for a random lattice.
+    pub(super) fn crystal(&self, kind: LatticeKind) -> Result<Option<&Crystal<D>>, PipelineError> {
+        match kind {
+            LatticeKind::Random => Ok(None),
+            LatticeKind::Default => Ok(Some(&self.crystals[0].1)),
+            _ => match self.crystals.iter().find(|(name, _)| *name == kind) {
+                Some((_, crystal)) => Ok(Some(crystal)),
+                None => Err(PipelineError::LatticeDimension { kind, dimension: D }),
+            },
+        }
+    }
+
+    /// Atoms per d^D.
+    pub(super) fn density(&self, kind: LatticeKind) -> f64 {
+        let crystal = self.crystals.iter().find(|(name, _)| *name == kind);
+        crystal.unwrap_or(&self.crystals[0]).1.density()
+    }
+
+    /// What connects the atoms.
+    pub fn delaunay(&self) -> &Delaunay<D> {
+        &self.delaunay
+    }
+
+    /// What scatters them.
+    pub(super) fn scatterer(&self) -> &Scatterer<D> {
+        &self.scatterer
+    }
+}

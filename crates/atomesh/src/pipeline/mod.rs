@@ -1,0 +1,276 @@
+//! From an image to a mesh: the one entry point of every shell.
+//!
+//! [`prepare`] makes the potential b(x), the nominal distance d(x) and the weight β(x);
+//! [`Prepared::estimate`] says what the rest will take; [`Prepared::run`] grows the lattice, moves the
+//! atoms and connects them. All within lattice space; [`Outcome::world_mesh`] places the mesh in the
+//! world.
+//!
+//! ```
+//! use atomesh::image::{Frame, Image, Samples};
+//! use atomesh::pipeline::{Inputs, MeshOptions, Method, Size, prepare};
+//! use atomesh::watch::Silent;
+//!
+//! let mut grey = vec![200u8; 64 * 48];
+//! grey[24 * 64..25 * 64].fill(10); // a dark row
+//! let image = Image::new(Frame::new([64, 48])?, Samples::U8(grey))?;
+//! let options = MeshOptions { size: Size::Constant(6.0), ..Default::default() };
+//! let outcome = prepare(&Method::flat(), Inputs::image(&image), options, &mut Silent)?.run(&mut Silent)?;
+//! assert!(outcome.mesh().validate().is_ok());
+//! # Ok::<(), Box<dyn std::error::Error>>(())
+//! ```
+
+mod error;
+mod estimate;
+mod method;
+mod options;
+mod outcome;
+
+pub use error::{PipelineError, Warning};
+pub use estimate::Estimate;
+pub use method::Method;
+pub use options::{LatticeKind, MeshOptions, Size};
+pub use outcome::{MeshReport, Outcome};
+
+use crate::distance::{GRADIENT_LIMIT, Grading, NominalDistance, default_distance};
+use crate::enhance::{self, FeatureOptions, Features};
+use crate::geometry::{Point, hilbert_order};
+use crate::image::{Frame, Grid, Image, Units};
+use crate::lattice::{GrowOptions, Lattice, ScatterOptions, grow, scatter};
+use crate::optimize::{EngineKind, Fields, optimize};
+use crate::potential::{ImagePotential, ImageWeight, Interpolation};
+use crate::watch::{Phase, Watch, check};
+
+/// What a mesh is made from. Images other than the first must have its shape; its frame counts.
+#[derive(Clone, Copy)]
+pub struct Inputs<'a, const D: usize> {
+    /// The image, or, if `is_potential`, b(x) itself, values in −1…1.
+    pub image: &'a Image<D>,
+    /// Whether the image is taken as b(x) as it is.
+    pub is_potential: bool,
+    /// d(x), in lattice units; goes before [`MeshOptions::size`].
+    pub size_field: Option<&'a Image<D>>,
+    /// β(x), 0…1; goes before [`MeshOptions::image_weight`].
+    pub weight_field: Option<&'a Image<D>>,
+}
+
+impl<'a, const D: usize> Inputs<'a, D> {
+    /// An image alone.
+    pub fn image(image: &'a Image<D>) -> Self {
+        Self { image, is_potential: false, size_field: None, weight_field: None }
+    }
+}
+
+/// Everything that atoms need to know of the image.
+pub struct Prepared<'m, const D: usize> {
+    method: &'m Method<D>,
+    options: MeshOptions<D>,
+    frame: Frame<D>,
+    grid: Grid<D>,
+    potential: ImagePotential<D>,
+    weight: ImageWeight<D>,
+    distance: NominalDistance<D>,
+    warnings: Vec<Warning>,
+}
+
+/// Makes b(x), d(x) and β(x).
+///
+/// # Errors
+/// [`PipelineError`] if an option is out of range, a field has another shape or bad values, the samples
+/// are not finite, or the work was cancelled.
+pub fn prepare<'m, const D: usize>(
+    method: &'m Method<D>,
+    inputs: Inputs<'_, D>,
+    options: MeshOptions<D>,
+    watch: &mut dyn Watch,
+) -> Result<Prepared<'m, D>, PipelineError> {
+    let frame = *inputs.image.frame();
+    let grid = frame.grid(options.units);
+    options.optimize.validate()?;
+    if let Some(axis) = (0..D).find(|&k| grid.shape[k] < 2) {
+        return Err(PipelineError::Thin { axis });
+    }
+    method.crystal(options.lattice)?; // refuse early what does not fit the dimension
+    let mut warnings = Vec::new();
+    let samples = potential_samples(&inputs, &options, &mut warnings, watch)?;
+    check(watch, Phase::Distance, 0.0, None)?;
+    let distance = nominal_distance(&inputs, &grid, &options, &samples)?;
+    let weight = match inputs.weight_field {
+        Some(field) => {
+            same_shape("weight field", &frame, field)?;
+            ImageWeight::field(grid, field.samples().to_f32())?
+        }
+        None => ImageWeight::constant(options.image_weight)?,
+    };
+    let extent = grid.bounds().extent();
+    if let Some(axis) = (0..D).find(|&k| distance.least() > extent[k]) {
+        let (distance, extent) = (distance.least(), extent[axis]);
+        warnings.push(Warning::Coarse { axis, distance, extent });
+    }
+    check(watch, Phase::Distance, 1.0, None)?;
+    let potential = ImagePotential::new(grid, samples, options.interpolation)?;
+    Ok(Prepared { method, options, frame, grid, potential, weight, distance, warnings })
+}
+
+/// b at the samples: enhanced, or as given.
+fn potential_samples<const D: usize>(
+    inputs: &Inputs<'_, D>,
+    options: &MeshOptions<D>,
+    warnings: &mut Vec<Warning>,
+    watch: &mut dyn Watch,
+) -> Result<Vec<f32>, PipelineError> {
+    if inputs.is_potential {
+        return Ok(enhance::given_potential(inputs.image.samples().clone())?);
+    }
+    let features = FeatureOptions { units: options.units, ..options.features };
+    let enhanced = enhance::enhance(inputs.image, &features, watch)?;
+    if enhanced.constant && features.features != Features::None {
+        warnings.push(Warning::Constant);
+    }
+    Ok(enhanced.values)
+}
+
+fn nominal_distance<const D: usize>(
+    inputs: &Inputs<'_, D>,
+    grid: &Grid<D>,
+    options: &MeshOptions<D>,
+    samples: &[f32],
+) -> Result<NominalDistance<D>, PipelineError> {
+    if let Some(field) = inputs.size_field {
+        same_shape("size field", inputs.image.frame(), field)?;
+        let values = field.samples().to_f32();
+        return Ok(NominalDistance::from_field(grid, &values, GRADIENT_LIMIT)?);
+    }
+    Ok(match options.size {
+        Size::Default => NominalDistance::constant(grid, default_distance(grid))?,
+        Size::Constant(d) => NominalDistance::constant(grid, d)?,
+        Size::Range { min, max } => {
+            NominalDistance::from_potential(grid, samples, &Grading::new(min, max))?
+        }
+    })
+}
+
+fn same_shape<const D: usize>(
+    name: &'static str,
+    frame: &Frame<D>,
+    field: &Image<D>,
+) -> Result<(), PipelineError> {
+    let (expected, found) = (frame.shape().to_vec(), field.frame().shape().to_vec());
+    if expected == found { Ok(()) } else { Err(PipelineError::Shape { name, expected, found }) }
+}
+
+impl<const D: usize> Prepared<'_, D> {
+    /// The image's frame.
+    pub fn frame(&self) -> &Frame<D> {
+        &self.frame
+    }
+
+    /// b(x).
+    pub fn potential(&self) -> &ImagePotential<D> {
+        &self.potential
+    }
+
+    /// d(x).
+    pub fn distance(&self) -> &NominalDistance<D> {
+        &self.distance
+    }
+
+    /// What was odd so far.
+    pub fn warnings(&self) -> &[Warning] {
+        &self.warnings
+    }
+
+    /// What the rest of the work will take.
+    pub fn estimate(&self) -> Estimate {
+        let density = self.method.density(self.options.lattice);
+        let atoms = estimate::atoms(&self.grid, &self.distance, density);
+        let field = self.options.optimize.engine == EngineKind::Sampled;
+        let spline = self.options.interpolation == Interpolation::Spline;
+        let smooth = self.options.optimize.smoothing_steps > 0;
+        let copies = [field, spline, smooth, smooth && spline].into_iter().filter(|&c| c).count();
+        Estimate::new::<D>(self.grid.sample_count(), atoms, 1 + copies)
+    }
+
+    /// Fills the box with atoms.
+    ///
+    /// # Errors
+    /// [`PipelineError::Lattice`].
+    pub fn grow(&self, watch: &mut dyn Watch) -> Result<Lattice<D>, PipelineError> {
+        let bounds = self.grid.bounds();
+        let units = self.options.units;
+        let seeds: Vec<Point<D>> = (self.options.seed_points.iter())
+            .map(|p| self.frame.world_to_lattice(units, p))
+            // a point meant to be on the boundary may come back a rounding outside
+            .map(|p| snap_to(&p, &bounds))
+            .collect();
+        let lattice = match self.method.crystal(self.options.lattice)? {
+            Some(crystal) => {
+                let options =
+                    GrowOptions { spacing_factor: self.options.spacing_factor, seed_points: seeds };
+                grow(crystal, bounds, &self.distance, &options, watch)?
+            }
+            None => {
+                let options =
+                    ScatterOptions { seed: self.options.optimize.seed, seed_points: seeds };
+                scatter(self.method.scatterer(), bounds, &self.distance, &options, watch)?
+            }
+        };
+        let order = hilbert_order(lattice.atoms());
+        Ok(lattice.reordered(&order))
+    }
+
+    /// Grows the lattice, moves the atoms, connects them.
+    ///
+    /// # Errors
+    /// [`PipelineError`] if memory does not suffice, the energy is not finite, or the work was cancelled.
+    pub fn run(self, watch: &mut dyn Watch) -> Result<Outcome<D>, PipelineError> {
+        let estimate = self.estimate();
+        if let Some(available) = self.options.memory_limit
+            && estimate.memory > available
+        {
+            let least = self.distance.least();
+            return Err(PipelineError::Memory { needed: estimate.memory, available, least });
+        }
+        let lattice = self.grow(watch)?;
+        let fields =
+            Fields { potential: &self.potential, weight: &self.weight, distance: &self.distance };
+        let optimized = optimize(lattice, fields, &self.options.optimize, watch)?;
+        let (lattice, report) = optimized.into_parts();
+        let mesh = self.method.delaunay().connect(lattice.atoms(), watch)?;
+        drop(lattice);
+        let distance = mesh.points().iter().map(|p| self.distance.at(p) as f32).collect();
+        let potential = mesh.points().iter().map(|p| self.potential.value(p) as f32).collect();
+        Ok(Outcome {
+            mesh,
+            distance_at_points: distance,
+            potential_at_points: potential,
+            potential: self.potential,
+            distance: self.distance,
+            frame: self.frame,
+            units: self.options.units,
+            optimize_report: report,
+            warnings: self.warnings,
+        })
+    }
+}
+
+/// The nearest point of the box, if it is within a rounding of it; else the point itself.
+fn snap_to<const D: usize>(p: &Point<D>, bounds: &crate::geometry::Bounds<D>) -> Point<D> {
+    let inside = bounds.clamp(p);
+    let extent = bounds.extent();
+    let near = (0..D).all(|k| (inside[k] - p[k]).abs() <= 1e-9 * extent[k]);
+    if near { inside } else { *p }
+}
+
+/// The mesh with its points moved to the world: cells turn over where the frame mirrors.
+fn place<const D: usize>(
+    mesh: &crate::mesh::Mesh<D>,
+    frame: &Frame<D>,
+    units: Units,
+) -> crate::mesh::Mesh<D> {
+    let points = mesh.points().iter().map(|p| frame.lattice_to_world(units, p)).collect();
+    let mut corners = mesh.corners().to_vec();
+    if frame.is_mirrored() {
+        corners.chunks_exact_mut(D + 1).for_each(|cell| cell.swap(D - 1, D));
+    }
+    crate::mesh::Mesh::new(points, corners).expect("finite frames keep points finite")
+}

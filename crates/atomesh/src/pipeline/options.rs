@@ -1,0 +1,101 @@
+//! What a user may choose.
+
+use serde::{Deserialize, Serialize};
+
+use crate::enhance::FeatureOptions;
+use crate::geometry::Point;
+use crate::image::Units;
+use crate::optimize::OptimizeOptions;
+use crate::potential::Interpolation;
+
+/// The nominal distance wanted, in lattice units.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize)]
+#[serde(rename_all = "kebab-case")]
+pub enum Size {
+    /// [`crate::distance::default_distance`] of the image's box.
+    #[default]
+    Default,
+    /// The same everywhere.
+    Constant(f64),
+    /// From `min` where features are dense to `max` where there are none (the paper's Fig. 5).
+    Range {
+        /// Where features are densest.
+        min: f64,
+        /// Where there are none.
+        max: f64,
+    },
+}
+
+/// How the box is filled with atoms.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(rename_all = "kebab-case")]
+pub enum LatticeKind {
+    /// Hexagonal in 2-D, body-centred cubic in 3-D.
+    #[default]
+    Default,
+    /// Equilateral triangles; 2-D.
+    Hexagonal,
+    /// Face-centred cubic; 3-D, the paper's.
+    Fcc,
+    /// Body-centred cubic; 3-D.
+    Bcc,
+    /// Scattered at random, without a preferred direction (Hale 2002).
+    Random,
+}
+
+impl LatticeKind {
+    /// The name on the command line.
+    pub fn name(self) -> &'static str {
+        match self {
+            LatticeKind::Default => "default",
+            LatticeKind::Hexagonal => "hexagonal",
+            LatticeKind::Fcc => "fcc",
+            LatticeKind::Bcc => "bcc",
+            LatticeKind::Random => "random",
+        }
+    }
+}
+
+/// Everything a user may choose about a mesh.
+#[derive(Clone, Debug, PartialEq)]
+pub struct MeshOptions<const D: usize> {
+    /// How the image becomes a potential; its `units` are overruled by [`MeshOptions::units`].
+    pub features: FeatureOptions,
+    /// How b is read between samples.
+    pub interpolation: Interpolation,
+    /// The lattice space. Default physical.
+    pub units: Units,
+    /// The nominal distance.
+    pub size: Size,
+    /// β, the weight of the image against regularity, in 0…1; equation (4). Default 0.4: "typically, we
+    /// choose β ≈ 1/2" (Hale 2001); at 0.4 the least shaped cells of our 3-D meshes are markedly better,
+    /// for a tenth less alignment.
+    pub image_weight: f64,
+    /// The lattice to start from.
+    pub lattice: LatticeKind,
+    /// γ, the share of d that an atom of the starting lattice keeps to itself. Default 0.8, the paper's.
+    pub spacing_factor: f64,
+    /// Atoms that stay where they are, in world coordinates: wells. Growth starts there.
+    pub seed_points: Vec<Point<D>>,
+    /// How atoms are moved; its seed is the run's.
+    pub optimize: OptimizeOptions,
+    /// Bytes beyond which the work is refused. Default none.
+    pub memory_limit: Option<u64>,
+}
+
+impl<const D: usize> Default for MeshOptions<D> {
+    fn default() -> Self {
+        Self {
+            features: FeatureOptions::default(),
+            interpolation: Interpolation::default(),
+            units: Units::default(),
+            size: Size::default(),
+            image_weight: 0.4,
+            lattice: LatticeKind::default(),
+            spacing_factor: 0.8,
+            seed_points: Vec::new(),
+            optimize: OptimizeOptions::default(),
+            memory_limit: None,
+        }
+    }
+}

@@ -1,0 +1,111 @@
+//! What a run gives.
+
+use crate::distance::NominalDistance;
+use crate::geometry::Point;
+use crate::image::{Frame, Units};
+use crate::measure::{AlignmentOptions, AlignmentReport, ShapeReport, alignment, features, shape};
+use crate::mesh::Mesh;
+use crate::optimize::OptimizeReport;
+use crate::potential::ImagePotential;
+use crate::watch::Watch;
+
+use super::error::{PipelineError, Warning};
+
+/// A mesh, the fields it follows, and how it came about.
+#[derive(Clone, Debug)]
+pub struct Outcome<const D: usize> {
+    pub(super) mesh: Mesh<D>,
+    pub(super) distance_at_points: Vec<f32>,
+    pub(super) potential_at_points: Vec<f32>,
+    pub(super) potential: ImagePotential<D>,
+    pub(super) distance: NominalDistance<D>,
+    pub(super) frame: Frame<D>,
+    pub(super) units: Units,
+    pub(super) optimize_report: OptimizeReport,
+    pub(super) warnings: Vec<Warning>,
+}
+
+/// The figures of a mesh: METHOD's *shape* and *alignment*.
+#[derive(Clone, Debug, PartialEq, serde::Serialize)]
+pub struct MeshReport {
+    /// Shape of the cells, in lattice space.
+    pub shape: ShapeReport,
+    /// How facets follow the potential's valleys.
+    pub alignment: AlignmentReport,
+}
+
+impl<const D: usize> Outcome<D> {
+    /// The mesh in lattice coordinates.
+    pub fn mesh(&self) -> &Mesh<D> {
+        &self.mesh
+    }
+
+    /// The mesh in world coordinates, cells of positive orientation.
+    pub fn world_mesh(&self) -> Mesh<D> {
+        super::place(&self.mesh, &self.frame, self.units)
+    }
+
+    /// The mesh in sample coordinates: what drawing and alignment work in.
+    pub fn sample_mesh(&self) -> Mesh<D> {
+        let step = self.potential.grid().step;
+        let to_sample = |p: &Point<D>| std::array::from_fn(|k| p[k] / step[k]);
+        let points = self.mesh.points().iter().map(to_sample).collect();
+        Mesh::new(points, self.mesh.corners().to_vec()).expect("steps above 0 keep points finite")
+    }
+
+    /// d at the mesh's points, in lattice units.
+    pub fn distance_at_points(&self) -> &[f32] {
+        &self.distance_at_points
+    }
+
+    /// b at the mesh's points.
+    pub fn potential_at_points(&self) -> &[f32] {
+        &self.potential_at_points
+    }
+
+    /// b(x).
+    pub fn potential(&self) -> &ImagePotential<D> {
+        &self.potential
+    }
+
+    /// d(x).
+    pub fn distance(&self) -> &NominalDistance<D> {
+        &self.distance
+    }
+
+    /// The image's frame.
+    pub fn frame(&self) -> &Frame<D> {
+        &self.frame
+    }
+
+    /// The lattice space.
+    pub fn units(&self) -> Units {
+        self.units
+    }
+
+    /// What the optimizer did.
+    pub fn optimize_report(&self) -> &OptimizeReport {
+        &self.optimize_report
+    }
+
+    /// What was odd.
+    pub fn warnings(&self) -> &[Warning] {
+        &self.warnings
+    }
+
+    /// Measures shape and alignment.
+    ///
+    /// # Errors
+    /// [`PipelineError::Measure`], also when cancelled.
+    pub fn report(&self, watch: &mut dyn Watch) -> Result<MeshReport, PipelineError> {
+        let grid = self.potential.grid();
+        let shape = shape(&self.mesh, Some(&grid.bounds()), watch)?;
+        // d in samples: the geometric mean over the axes, where steps differ
+        let step = grid.step.iter().product::<f64>().powf(1.0 / D as f64);
+        let size = self.distance.mean() / step;
+        let found = features(self.potential.samples(), grid.shape, size, watch)?;
+        let alignment =
+            alignment(&self.sample_mesh(), &found, &AlignmentOptions::new(size), watch)?;
+        Ok(MeshReport { shape, alignment })
+    }
+}
