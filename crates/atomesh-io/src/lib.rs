@@ -1,1 +1,3 @@
-//! x
+//! Files in and out: images with their frames, and meshes.
+
+pub mod atomic_file;
