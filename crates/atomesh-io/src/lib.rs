@@ -1,3 +1,4 @@
 //! Files in and out: images with their frames, and meshes.
 
 pub mod atomic_file;
+pub mod image;

@@ -1,0 +1,263 @@
+//! What can go wrong with an image file.
+
+use std::error::Error;
+use std::io;
+use std::path::PathBuf;
+
+use atomesh::image::FrameError;
+use atomesh::watch::Cancelled;
+
+use super::{ImageFormat, SampleType};
+
+/// An image could not be read; the message names the file and the reason.
+#[derive(Debug, thiserror::Error)]
+#[error("{}: {reason}", path.display())]
+#[non_exhaustive]
+pub struct ReadError {
+    /// The file.
+    pub path: PathBuf,
+    /// What is wrong with it.
+    pub reason: ReadReason,
+}
+
+/// Why an image could not be read.
+#[derive(Debug, thiserror::Error)]
+#[non_exhaustive]
+pub enum ReadReason {
+    /// The watch ended the work.
+    #[error(transparent)]
+    Cancelled(#[from] Cancelled),
+    /// The system refused to open or read the file.
+    #[error("cannot be read: {0}")]
+    Io(io::Error),
+    /// The file's name ends like no format that is known.
+    #[error(
+        "no image format is known by the ending {extension:?}; known are {}, and any file as raw \
+         samples when shape and type are given",
+        ImageFormat::EXTENSIONS.join(" ")
+    )]
+    UnknownExtension {
+        /// The ending found, empty if there is none.
+        extension: String,
+    },
+    /// The name ends in `.raw`, and no layout was given.
+    #[error("raw samples say neither their shape nor their type: both must be given")]
+    NoRawLayout,
+    /// There are no bytes in the file.
+    #[error("the file is empty; expected {format}")]
+    Empty {
+        /// The format that the name promises.
+        format: ImageFormat,
+    },
+    /// The file does not begin as its format does.
+    #[error("begins with the bytes {found:02x?}, unlike {format}{}", hint(found))]
+    Magic {
+        /// The format that the name promises.
+        format: ImageFormat,
+        /// The first bytes found.
+        found: Vec<u8>,
+    },
+    /// The samples end early.
+    #[error("the file is cut short: {found} of {expected} samples are there")]
+    Truncated {
+        /// The samples that the header promises.
+        expected: u64,
+        /// The whole samples found.
+        found: u64,
+    },
+    /// A header states something impossible.
+    #[error("{format} header: {field} is {value}; expected {expected}")]
+    Header {
+        /// The format whose header it is.
+        format: ImageFormat,
+        /// The name of the entry, as the format's definition spells it.
+        field: &'static str,
+        /// The value found.
+        value: String,
+        /// What would have been right.
+        expected: &'static str,
+    },
+    /// The file is sound and holds something that has no reader here.
+    #[error("{format} file holds {found}; supported is {expected}")]
+    Unsupported {
+        /// The format of the file.
+        format: ImageFormat,
+        /// What it holds.
+        found: String,
+        /// What can be read.
+        expected: &'static str,
+    },
+    /// A header promises more samples than so short a file can hold, even compressed.
+    #[error("the header promises {shape} samples, more than a file of {file_bytes} bytes can hold")]
+    TooLarge {
+        /// The samples along each axis, as in `640 × 480`.
+        shape: String,
+        /// The size of the file.
+        file_bytes: u64,
+    },
+    /// More than one volume in a file.
+    #[error("holds {count} volumes; expected one: extract the volume to be meshed")]
+    Volumes {
+        /// The number of volumes.
+        count: u64,
+    },
+    /// The axes of the header's affine matrix are not at right angles.
+    #[error(
+        "the header's axes {first} and {second} meet at {degrees:.3} degrees; expected 90, since a \
+         sheared grid has no frame: resample the image"
+    )]
+    Sheared {
+        /// The first axis of the pair, 0 for x.
+        first: usize,
+        /// The second axis of the pair.
+        second: usize,
+        /// The angle between the two.
+        degrees: f64,
+    },
+    /// The pages of a file differ.
+    #[error("page {page} is {found}; expected {expected}, as page 1 is")]
+    Page {
+        /// The number of the page, from 1.
+        page: usize,
+        /// Shape and type of that page.
+        found: String,
+        /// Shape and type of page 1.
+        expected: String,
+    },
+    /// The size of a raw file is not that of its samples.
+    #[error(
+        "holds {found} bytes; expected {expected}, for {shape:?} {sample_type} samples after \
+         {offset} bytes"
+    )]
+    RawSize {
+        /// The size of the file.
+        found: u64,
+        /// The size that the layout asks for.
+        expected: u128,
+        /// Samples along x, y (and z).
+        shape: Vec<usize>,
+        /// The type of the samples.
+        sample_type: SampleType,
+        /// The bytes before the first sample.
+        offset: u64,
+    },
+    /// A raw layout has neither two nor three axes.
+    #[error("raw shape {shape:?} has {} axes; expected 2 or 3", shape.len())]
+    RawShape {
+        /// Samples along the axes given.
+        shape: Vec<usize>,
+    },
+    /// The samples do not fit into memory.
+    #[error("no memory for {bytes} bytes of samples; crop or resample the image")]
+    Memory {
+        /// The bytes asked for.
+        bytes: u128,
+    },
+    /// The header's frame is impossible.
+    #[error("{0}")]
+    Frame(#[from] FrameError),
+    /// The format's decoder gave up.
+    #[error("not a valid {format} file: {error}")]
+    Decoder {
+        /// The format that was decoded.
+        format: ImageFormat,
+        /// What the decoder said.
+        error: Box<dyn Error + Send + Sync>,
+    },
+}
+
+impl ReadReason {
+    /// The reason that a decoder's error stands for.
+    pub(super) fn decoder(
+        format: ImageFormat,
+        error: impl Into<Box<dyn Error + Send + Sync>>,
+    ) -> Self {
+        Self::Decoder { format, error: error.into() }
+    }
+}
+
+/// What the first bytes say about a file with the wrong name.
+fn hint(head: &[u8]) -> &'static str {
+    match head {
+        [0x1f, 0x8b, ..] => ": compressed by gzip, so a name in .nii.gz might be right",
+        [0x89, b'P', b'N', b'G', ..] => ": like PNG",
+        [0xff, 0xd8, 0xff, ..] => ": like JPEG",
+        [b'I', b'I', 42 | 43, 0, ..] | [b'M', b'M', 0, 42 | 43, ..] => ": like TIFF",
+        [0x93, b'N', b'U', b'M', ..] => ": like NPY",
+        [0x89, b'H', b'D', b'F', ..] => ": like HDF5",
+        [b'P', b'K', 3, 4, ..] => ": like ZIP or NPZ",
+        _ => "",
+    }
+}
+
+/// An image could not be written; the message names the file and the reason.
+#[derive(Debug, thiserror::Error)]
+#[error("{}: {reason}", path.display())]
+#[non_exhaustive]
+pub struct WriteError {
+    /// The file.
+    pub path: PathBuf,
+    /// What is wrong.
+    pub reason: WriteReason,
+}
+
+/// Why an image could not be written.
+#[derive(Debug, thiserror::Error)]
+#[non_exhaustive]
+pub enum WriteReason {
+    /// The watch ended the work.
+    #[error(transparent)]
+    Cancelled(#[from] Cancelled),
+    /// The system refused to create or write the file.
+    #[error("cannot be written: {0}")]
+    Io(#[from] io::Error),
+    /// The file's name ends like no format that can be written.
+    #[error(
+        "no image can be written by the ending {extension:?}; writable are \
+         .npy .nii .nii.gz .png .tif .tiff .raw"
+    )]
+    UnknownExtension {
+        /// The ending found, empty if there is none.
+        extension: String,
+    },
+    /// The format has no room for samples of this type.
+    #[error("{format} does not hold {sample_type} samples, only {expected}")]
+    SampleType {
+        /// The format wanted.
+        format: ImageFormat,
+        /// The type of the image's samples.
+        sample_type: &'static str,
+        /// The types that can be written, and where others can go.
+        expected: &'static str,
+    },
+    /// The format has no room for this many axes or samples.
+    #[error("{format} does not hold {shape:?} samples, only {expected}")]
+    Shape {
+        /// The format wanted.
+        format: ImageFormat,
+        /// Samples along x, y (and z).
+        shape: Vec<usize>,
+        /// What can be written, and where others can go.
+        expected: &'static str,
+    },
+    /// The format keeps a number in single precision, which cannot hold it.
+    #[error("{format} cannot hold the {quantity} {value}; expected {expected}")]
+    Frame {
+        /// The format wanted.
+        format: ImageFormat,
+        /// `spacing` or `origin`.
+        quantity: &'static str,
+        /// The value along one of the axes.
+        value: f64,
+        /// What can be written.
+        expected: &'static str,
+    },
+    /// The format's encoder gave up.
+    #[error("{format} cannot be encoded: {error}")]
+    Encoder {
+        /// The format wanted.
+        format: ImageFormat,
+        /// What the encoder said.
+        error: Box<dyn Error + Send + Sync>,
+    },
+}

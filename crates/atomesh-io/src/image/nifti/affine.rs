@@ -1,0 +1,262 @@
+//! From a NIfTI affine to a frame and back.
+
+use atomesh::geometry::dot;
+use atomesh::image::Frame;
+
+use super::super::ReadReason;
+use super::header::wrong;
+
+/// The least |cosine| of the angle between two axes at which they count as sheared: what a
+/// [`Frame`] tolerates, 0.006 degrees.
+const SHEAR: f64 = 1e-4;
+
+/// Sample indices to world coordinates: `world = matrix · index + origin`.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub(super) struct Affine {
+    pub matrix: [[f64; 3]; 3],
+    pub origin: [f64; 3],
+}
+
+impl Affine {
+    /// Axes along the world's, from the origin.
+    pub fn scaling(spacing: [f64; 3]) -> Self {
+        let matrix =
+            std::array::from_fn(|r| std::array::from_fn(|c| if r == c { spacing[c] } else { 0.0 }));
+        Self { matrix, origin: [0.0; 3] }
+    }
+
+    /// The affine of a frame; that of a flat one lies in the plane z = 0.
+    pub fn of<const D: usize>(frame: &Frame<D>) -> Self {
+        let mut affine = Self::scaling([1.0; 3]);
+        for r in 0..D {
+            affine.origin[r] = frame.origin()[r];
+            for c in 0..D {
+                affine.matrix[r][c] = frame.direction()[r][c] * frame.spacing()[c];
+            }
+        }
+        affine
+    }
+}
+
+/// The frame of an affine whose columns are at right angles: spacings are their lengths, directions
+/// the columns divided by those. Single precision leaves the directions askew by some 1e-7; they
+/// are turned to the nearest orthonormal ones, so that a frame maps there and back exactly.
+///
+/// # Errors
+/// If an entry is not finite, a column is zero, or two columns are not at right angles.
+pub(super) fn frame<const D: usize>(
+    shape: [usize; D],
+    affine: Affine,
+) -> Result<Frame<D>, ReadReason> {
+    let mut columns: [[f64; D]; D] =
+        std::array::from_fn(|c| std::array::from_fn(|r| affine.matrix[r][c]));
+    let mut spacing = [0.0; D];
+    for c in 0..D {
+        spacing[c] = dot(&columns[c], &columns[c]).sqrt();
+        if !(spacing[c].is_finite() && spacing[c] > 0.0) {
+            const NAMES: [&str; 3] = ["affine column x", "affine column y", "affine column z"];
+            let value = format!("{:?}", columns[c]);
+            return Err(wrong(NAMES[c], value, "finite numbers that are not all 0"));
+        }
+        columns[c] = columns[c].map(|x| x / spacing[c]);
+    }
+    for first in 0..D {
+        for second in first + 1..D {
+            let cosine = dot(&columns[first], &columns[second]);
+            if cosine.abs() > SHEAR {
+                let degrees = cosine.clamp(-1.0, 1.0).acos().to_degrees();
+                return Err(ReadReason::Sheared { first, second, degrees });
+            }
+        }
+    }
+    let columns = orthonormal(columns);
+    let direction = std::array::from_fn(|r| std::array::from_fn(|c| columns[c][r]));
+    let origin = std::array::from_fn(|r| affine.origin[r]);
+    Ok(Frame::new(shape)?.with_spacing(spacing)?.with_origin(origin)?.with_direction(direction)?)
+}
+
+/// The frame of a flat image, whose axes must lie in the plane of the world's x and y.
+///
+/// # Errors
+/// As [`frame`], and if the plane is another one.
+pub(super) fn flat_frame(shape: [usize; 2], affine: Affine) -> Result<Frame<2>, ReadReason> {
+    let rise = &affine.matrix[2][..2];
+    let length = affine.matrix.iter().flat_map(|row| &row[..2]).fold(0.0, |m, x| x.abs().max(m));
+    if rise.iter().any(|z| z.abs() > SHEAR * length) {
+        let value = format!("{rise:?}");
+        return Err(wrong("affine row z", value, "0 for an image of two axes, in the plane x, y"));
+    }
+    frame(shape, affine)
+}
+
+/// The orthonormal vectors nearest to `columns`, which are so within [`SHEAR`]: the limit of
+/// C ← C (3 − CᵀC) / 2, whose error is squared by each step. Vectors that are orthonormal stay
+/// as they are.
+fn orthonormal<const D: usize>(columns: [[f64; D]; D]) -> [[f64; D]; D] {
+    let mut columns = columns;
+    for _ in 0..3 {
+        let old = columns;
+        for a in 0..D {
+            for b in 0..D {
+                let identity = if a == b { 1.0 } else { 0.0 };
+                let half_error = (identity - dot(&old[a], &old[b])) / 2.0;
+                for r in 0..D {
+                    columns[a][r] += half_error * old[b][r];
+                }
+            }
+        }
+    }
+    columns
+}
+
+/// The rotation of the unit quaternion (√(1 − b² − c² − d²), b, c, d), as the format defines it.
+///
+/// # Errors
+/// If b² + c² + d² is not finite or exceeds 1 by more than single precision explains.
+pub(super) fn rotation(quaternion: [f64; 3]) -> Result<[[f64; 3]; 3], ReadReason> {
+    let squared = dot(&quaternion, &quaternion);
+    if squared.is_nan() || squared > 1.0 + 1e-5 {
+        let value = format!("{quaternion:?}");
+        return Err(wrong("quatern_b, c, d", value, "numbers whose squares add up to at most 1"));
+    }
+    let scale = if squared > 1.0 { squared.sqrt().recip() } else { 1.0 };
+    let [b, c, d] = quaternion.map(|q| q * scale);
+    let a = (1.0 - dot(&[b, c, d], &[b, c, d])).max(0.0).sqrt();
+    Ok([
+        [a * a + b * b - c * c - d * d, 2.0 * (b * c - a * d), 2.0 * (b * d + a * c)],
+        [2.0 * (b * c + a * d), a * a + c * c - b * b - d * d, 2.0 * (c * d - a * b)],
+        [2.0 * (b * d - a * c), 2.0 * (c * d + a * b), a * a + d * d - b * b - c * c],
+    ])
+}
+
+/// The quaternion (b, c, d) of a frame's direction and qfac, −1 if its z axis is mirrored.
+pub(super) fn quaternion<const D: usize>(frame: &Frame<D>) -> ([f64; 3], f64) {
+    let mut m = Affine::scaling([1.0; 3]).matrix;
+    for r in 0..D {
+        m[r][..D].copy_from_slice(&frame.direction()[r]);
+    }
+    let qfac = if frame.is_mirrored() { -1.0 } else { 1.0 };
+    m.iter_mut().for_each(|row| row[2] *= qfac);
+
+    // the largest of the four components is found first and divides the others
+    let trace = m[0][0] + m[1][1] + m[2][2];
+    let quarters = [trace, m[0][0], m[1][1], m[2][2]];
+    let largest = (1..4).fold(0, |best, k| if quarters[k] > quarters[best] { k } else { best });
+    let [a, b, c, d] = match largest {
+        0 => [1.0 + trace, m[2][1] - m[1][2], m[0][2] - m[2][0], m[1][0] - m[0][1]],
+        1 => [m[2][1] - m[1][2], 1.0 + 2.0 * m[0][0] - trace, m[0][1] + m[1][0], m[0][2] + m[2][0]],
+        2 => [m[0][2] - m[2][0], m[0][1] + m[1][0], 1.0 + 2.0 * m[1][1] - trace, m[1][2] + m[2][1]],
+        _ => [m[1][0] - m[0][1], m[0][2] + m[2][0], m[1][2] + m[2][1], 1.0 + 2.0 * m[2][2] - trace],
+    };
+    let norm = (a * a + b * b + c * c + d * d).sqrt();
+    let sign = if a < 0.0 { -1.0 } else { 1.0 }; // the format has no room for a negative a
+    ([b, c, d].map(|q| sign * q / norm), qfac)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use proptest::prelude::*;
+
+    #[test]
+    fn quarter_turns_are_exact() {
+        // about z: x goes to y
+        let half = 0.5f64.sqrt();
+        let r = rotation([0.0, 0.0, half]).unwrap();
+        let expected = [[0.0, -1.0, 0.0], [1.0, 0.0, 0.0], [0.0, 0.0, 1.0]];
+        for (row, wanted) in r.iter().zip(expected) {
+            for (x, w) in row.iter().zip(wanted) {
+                assert!((x - w).abs() < 1e-15, "{r:?}");
+            }
+        }
+    }
+
+    #[test]
+    fn impossible_quaternions_are_refused_and_rounded_ones_taken() {
+        assert!(rotation([1.0, 0.1, 0.0]).is_err());
+        assert!(rotation([f64::NAN, 0.0, 0.0]).is_err());
+        assert!(rotation([f64::INFINITY, 0.0, 0.0]).is_err());
+        let turned = rotation([1.000_001, 0.0, 0.0]).unwrap();
+        assert_eq!(turned, [[1.0, 0.0, 0.0], [0.0, -1.0, 0.0], [0.0, 0.0, -1.0]]);
+    }
+
+    #[test]
+    fn shear_is_refused_with_its_angle() {
+        let mut affine = Affine::scaling([1.0, 2.0, 3.0]);
+        affine.matrix[0][1] = 2.0; // y leans by 45 degrees
+        match frame([2, 2, 2], affine) {
+            Err(ReadReason::Sheared { first: 0, second: 1, degrees }) => {
+                assert!((degrees - 45.0).abs() < 1e-12);
+            }
+            other => panic!("{other:?}"),
+        }
+    }
+
+    #[test]
+    fn degenerate_columns_are_refused() {
+        for bad in [0.0, f64::NAN, f64::INFINITY, 1e300] {
+            let error = frame([2, 2, 2], Affine::scaling([1.0, bad, 1.0])).unwrap_err();
+            assert!(error.to_string().contains("affine column y"), "{error}");
+        }
+        let mut affine = Affine::scaling([1.0; 3]);
+        affine.origin[2] = f64::NAN;
+        assert!(frame([2, 2, 2], affine).is_err());
+    }
+
+    #[test]
+    fn a_flat_image_stays_in_its_plane() {
+        let mut affine = Affine::scaling([2.0, 3.0, 1.0]);
+        affine.origin = [1.0, 2.0, 9.0];
+        let flat = flat_frame([4, 5], affine).unwrap();
+        assert_eq!((flat.spacing(), flat.origin()), ([2.0, 3.0], [1.0, 2.0]));
+        affine.matrix[2][1] = 0.5;
+        assert!(flat_frame([4, 5], affine).unwrap_err().to_string().contains("row z"));
+    }
+
+    proptest! {
+        /// Any rotation or reflection goes through the quaternion and back. Tolerance: a few
+        /// roundings; where a is small it is √ of a difference, whence √ε.
+        #[test]
+        fn directions_survive_the_quaternion(
+            q in prop::array::uniform4(-1.0f64..1.0), mirrored: bool,
+        ) {
+            let norm = q.iter().map(|x| x * x).sum::<f64>().sqrt();
+            prop_assume!(norm > 0.1);
+            let sign = if q[3] < 0.0 { -1.0 } else { 1.0 };
+            let mut direction =
+                rotation([q[0], q[1], q[2]].map(|x| sign * x / norm)).unwrap();
+            if mirrored {
+                direction.iter_mut().for_each(|row| row[1] = -row[1]);
+            }
+            let frame = Frame::new([2, 2, 2]).unwrap().with_direction(direction).unwrap();
+            let (quaternion, qfac) = quaternion(&frame);
+            let mut back = rotation(quaternion).unwrap();
+            back.iter_mut().for_each(|row| row[2] *= qfac);
+            for r in 0..3 {
+                for c in 0..3 {
+                    prop_assert!((back[r][c] - direction[r][c]).abs() < 1e-7);
+                }
+            }
+        }
+
+        /// Directions rounded to single precision become orthonormal in double precision.
+        #[test]
+        fn frames_of_rounded_affines_map_there_and_back(
+            q in prop::array::uniform3(-0.57f64..0.57), spacing in prop::array::uniform3(0.1f64..9.0),
+        ) {
+            let turn = rotation(q).unwrap();
+            let mut affine = Affine::scaling(spacing);
+            affine.matrix = std::array::from_fn(|r| std::array::from_fn(|c| {
+                f64::from((turn[r][c] * spacing[c]) as f32)
+            }));
+            let direction = frame([2, 2, 2], affine).unwrap().direction();
+            for a in 0..3 {
+                for b in 0..3 {
+                    let dot: f64 = (0..3).map(|r| direction[r][a] * direction[r][b]).sum();
+                    let expected = if a == b { 1.0 } else { 0.0 };
+                    prop_assert!((dot - expected).abs() < 1e-15 * 4.0);
+                }
+            }
+        }
+    }
+}
