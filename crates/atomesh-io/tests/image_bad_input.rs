@@ -235,7 +235,7 @@ fn the_watch_ends_reading_and_writing_at_any_point() {
             let error = read_image(&path, &ReadOptions::default(), &mut watch).unwrap_err();
             assert!(matches!(error.reason, ReadReason::Cancelled(_)), "{name}: {error}");
             assert!(watch.shares.is_sorted() && watch.shares.len() as f64 > 4.0 * share);
-            if name == "f.png" {
+            if name == "f.png" && share > 0.0 {
                 continue; // encoded in one go
             }
             std::fs::remove_file(&path).unwrap();

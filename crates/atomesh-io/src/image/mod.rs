@@ -22,7 +22,7 @@ use std::io::{Cursor, Read, Seek};
 use std::path::Path;
 
 use atomesh::image::{Frame, FrameError, Image, Range, Samples};
-use atomesh::watch::{Cancelled, Watch};
+use atomesh::watch::{Cancelled, Phase, Watch, check};
 
 use crate::atomic_file::AtomicFile;
 
@@ -213,6 +213,15 @@ pub struct ReadOptions {
 /// Colour becomes luminance by Rec. 601, 0.299 R + 0.587 G + 0.114 B of the values as stored,
 /// rounded; opacity is ignored. NaN is kept: [`Samples::range`] counts it.
 ///
+/// ```no_run
+/// use atomesh::watch::Silent;
+/// use atomesh_io::image::{ReadOptions, read_image};
+///
+/// let image = read_image("brain.nii.gz".as_ref(), &ReadOptions::default(), &mut Silent)?;
+/// println!("{:?} samples of {}", image.shape(), image.type_name());
+/// # Ok::<(), atomesh_io::image::ReadError>(())
+/// ```
+///
 /// # Errors
 /// [`ReadError`] with the reason; a watch that ends the work gives [`ReadReason::Cancelled`].
 pub fn read_image(
@@ -303,6 +312,7 @@ pub fn write_image<const D: usize>(
     let mut write = || {
         let unknown = || WriteReason::UnknownExtension { extension: extension(path) };
         let format = ImageFormat::from_path(path).ok_or_else(unknown)?;
+        check(watch, Phase::Write, 0.0, None)?;
         let mut file = AtomicFile::create(path)?;
         match format {
             ImageFormat::Png => raster::write(&mut file, image)?,

@@ -16,23 +16,19 @@ const FORMAT: ImageFormat = ImageFormat::Npy;
 /// The longest header that is read; NumPy's own limit is 10,000.
 const LONGEST_HEADER: usize = 1 << 16;
 
+/// Samples for each byte of the file from which on a shape is called absurd and not cut short.
+const ABSURD: u64 = 1 << 10;
+
 /// Reads an array of two or three axes.
 pub(super) fn read<R: Read>(mut source: R, file_bytes: u64) -> Result<AnyImage, ReadReason> {
     let (text, start) = header_text(&mut source)?;
     let header = Header::parse(&text)?;
     let size = header.sample_type.size() as u64;
-    let count = super::plausible_count(&header.shape, file_bytes.saturating_sub(start) / size, 1);
-    let count = match count {
-        // shapes that a slightly longer file would hold are reported as a cut, with both counts
-        Err(_) => match super::plausible_count(&header.shape, file_bytes, 1 << 10) {
-            Ok(expected) => {
-                let found = file_bytes.saturating_sub(start) / size;
-                return Err(ReadReason::Truncated { expected: expected as u64, found });
-            }
-            Err(error) => return Err(error),
-        },
-        Ok(count) => count,
-    };
+    let count = super::plausible_count(&header.shape, file_bytes, ABSURD)?;
+    let found = file_bytes.saturating_sub(start) / size;
+    if count as u64 > found {
+        return Err(ReadReason::Truncated { expected: count as u64, found });
+    }
     let turned = match *header.shape {
         _ if !header.fortran_order => None,
         [nx, ny] => Some([nx, ny, 1]),

@@ -1,4 +1,8 @@
 //! PNG, JPEG and PNM through the `image` crate.
+//!
+//! Bits of fewer than 8 and PNM's samples with another greatest value than 255 or 65535 come
+//! stretched to the whole range of 8 or 16 bits. The orientation that a camera notes in a JPEG is
+//! not followed: row 0 is the first one stored.
 
 use std::io::{BufReader, Read, Seek, Write};
 
@@ -212,6 +216,8 @@ mod tests {
         assert_eq!(*text.samples(), Samples::U8(vec![0, 10, 20, 255]));
         let wide = decode(b"P5 1 2 65535\n\x01\x02\xff\xff", ImageFormat::Pnm).unwrap();
         assert_eq!(*wide.samples(), Samples::U16(vec![258, 65535]));
+        let stretched = decode(b"P2 3 1 15 0 5 15 ", ImageFormat::Pnm).unwrap();
+        assert_eq!(*stretched.samples(), Samples::U8(vec![0, 85, 255]));
         let colour = decode(b"P6 1 1 255\n\xff\x00\x00", ImageFormat::Pnm).unwrap();
         assert_eq!(*colour.samples(), Samples::U8(vec![76]));
     }

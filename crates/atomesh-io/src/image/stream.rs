@@ -153,7 +153,7 @@ fn half_to_single(bits: u16) -> f32 {
     }
 }
 
-/// Writes the samples of `range`, each with its least significant byte first.
+/// Writes the samples, each with its least significant byte first.
 pub(super) fn write_samples(
     out: &mut dyn Write,
     samples: &Samples,
