@@ -1,0 +1,133 @@
+//! Arrays of a mesh file, made piece by piece, so that no second copy of a mesh is ever held.
+
+use std::io::{self, Write};
+use std::ops::Range;
+
+use atomesh::mesh::Mesh;
+
+/// The order of the bytes in a number.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(super) enum Endian {
+    Little,
+    Big,
+}
+
+/// A number with a fixed place in files.
+pub(super) trait Number: Copy + Send + Sync {
+    /// The bytes it takes.
+    const SIZE: usize;
+    /// Appends the number's bytes.
+    fn put(self, endian: Endian, out: &mut Vec<u8>);
+    /// Takes the number from exactly `SIZE` bytes.
+    fn take(bytes: &[u8], endian: Endian) -> Self;
+}
+
+macro_rules! number {
+    ($($t:ty),*) => {$(
+        impl Number for $t {
+            const SIZE: usize = size_of::<$t>();
+
+            fn put(self, endian: Endian, out: &mut Vec<u8>) {
+                match endian {
+                    Endian::Little => out.extend_from_slice(&self.to_le_bytes()),
+                    Endian::Big => out.extend_from_slice(&self.to_be_bytes()),
+                }
+            }
+
+            fn take(bytes: &[u8], endian: Endian) -> Self {
+                let mut array = [0; size_of::<$t>()];
+                array.copy_from_slice(bytes);
+                match endian {
+                    Endian::Little => Self::from_le_bytes(array),
+                    Endian::Big => Self::from_be_bytes(array),
+                }
+            }
+        }
+    )*};
+}
+number!(i8, u8, i16, u16, i32, u32, i64, u64, f32, f64);
+
+/// An array of equal items that can be made from any index on.
+pub(super) struct Column<'a> {
+    count: usize,
+    item_size: usize,
+    fill: Box<dyn Fn(Range<usize>, &mut Vec<u8>) + Sync + 'a>,
+}
+
+impl<'a> Column<'a> {
+    /// `count` items of `item_size` bytes; `fill` appends those of a range.
+    pub fn new(
+        count: usize,
+        item_size: usize,
+        fill: impl Fn(Range<usize>, &mut Vec<u8>) + Sync + 'a,
+    ) -> Self {
+        Self { count, item_size, fill: Box::new(fill) }
+    }
+
+    /// The numbers `value(0)`, `value(1)` ... `value(count − 1)`.
+    pub fn numbers<T: Number>(
+        count: usize,
+        endian: Endian,
+        value: impl Fn(usize) -> T + Sync + 'a,
+    ) -> Self {
+        Self::new(count, T::SIZE, move |range, out| {
+            for i in range {
+                value(i).put(endian, out);
+            }
+        })
+    }
+
+    /// The numbers of a slice.
+    pub fn slice<T: Number>(values: &'a [T], endian: Endian) -> Self {
+        Self::numbers(values.len(), endian, |i| values[i])
+    }
+
+    /// The points of a mesh as x, y, z; z is 0 in a flat mesh.
+    pub fn points<const D: usize>(mesh: &'a Mesh<D>, endian: Endian) -> Self {
+        let points = mesh.points();
+        Self::new(points.len(), 24, move |range, out| {
+            for p in &points[range] {
+                for k in 0..3 {
+                    p.get(k).copied().unwrap_or(0.0).put(endian, out);
+                }
+            }
+        })
+    }
+
+    /// The number of items.
+    pub fn count(&self) -> usize {
+        self.count
+    }
+
+    /// The bytes of one item.
+    pub fn item_size(&self) -> usize {
+        self.item_size
+    }
+
+    /// Appends the items of a range.
+    pub fn fill(&self, range: Range<usize>, out: &mut Vec<u8>) {
+        (self.fill)(range, out);
+    }
+
+    /// The ranges of items that make blocks of at most `block` bytes, but one item at least.
+    pub fn blocks(&self, block: usize) -> impl ExactSizeIterator<Item = Range<usize>> + use<> {
+        let (count, each) = (self.count, (block / self.item_size).max(1));
+        (0..count.div_ceil(each)).map(move |b| b * each..((b + 1) * each).min(count))
+    }
+
+    /// Writes all items, a block at a time.
+    pub fn write(&self, out: &mut dyn Write) -> io::Result<()> {
+        let mut bytes = Vec::new();
+        for range in self.blocks(1 << 18) {
+            bytes.clear();
+            self.fill(range, &mut bytes);
+            out.write_all(&bytes)?;
+        }
+        Ok(())
+    }
+}
+
+/// Whether indices below `limit` fit in a signed 32-bit integer, which every reader takes.
+pub(super) fn fits_i32(limit: usize) -> bool {
+    i32::try_from(limit).is_ok()
+}

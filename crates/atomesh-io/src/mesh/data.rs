@@ -1,0 +1,205 @@
+//! What goes into a mesh file and what comes out of one.
+
+use atomesh::image::Frame;
+use atomesh::mesh::Mesh;
+
+/// What is wrong with the parts of a [`MeshData`].
+#[derive(Clone, Debug, PartialEq, thiserror::Error)]
+#[non_exhaustive]
+pub enum MeshDataError {
+    /// A field has not one value for each point or cell.
+    #[error("field {name:?} has {found} values for {expected} points or cells")]
+    FieldLength {
+        /// The field's name.
+        name: String,
+        /// The number of points or cells.
+        expected: usize,
+        /// The number of values.
+        found: usize,
+    },
+    /// A name that not every format can hold.
+    #[error(
+        "field name {name:?}; expected one that no other field has, of 1 to 64 letters, digits, '_', '-' or '.'"
+    )]
+    FieldName {
+        /// The name found.
+        name: String,
+    },
+}
+
+/// Where a mesh comes from: what is needed to make it again, and nothing that differs between two
+/// runs of the same input, options and seed (no threads, paths or times).
+#[derive(Clone, Debug, PartialEq)]
+pub struct Provenance {
+    /// The version of atomesh.
+    pub version: String,
+    /// The options of the run.
+    pub options: serde_json::Value,
+    /// The seed of the run's random numbers.
+    pub seed: u64,
+}
+
+/// A named value for each point, or each cell.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Field<'a> {
+    name: &'a str,
+    values: &'a [f32],
+}
+
+impl<'a> Field<'a> {
+    /// The name, fit for every format.
+    pub fn name(&self) -> &'a str {
+        self.name
+    }
+
+    /// The values, one for each point or cell.
+    pub fn values(&self) -> &'a [f32] {
+        self.values
+    }
+}
+
+/// A mesh in world coordinates, with what is known at its points and cells; borrowed, since meshes
+/// are large.
+#[derive(Clone, Debug)]
+pub struct MeshData<'a, const D: usize> {
+    mesh: &'a Mesh<D>,
+    point_fields: Vec<Field<'a>>,
+    cell_fields: Vec<Field<'a>>,
+    frame: Option<&'a Frame<D>>,
+    provenance: Option<&'a Provenance>,
+}
+
+impl<'a, const D: usize> MeshData<'a, D> {
+    /// A mesh alone. Its cells should be positive: they are written as they are.
+    pub fn new(mesh: &'a Mesh<D>) -> Self {
+        Self { mesh, point_fields: vec![], cell_fields: vec![], frame: None, provenance: None }
+    }
+
+    /// The same with a value at each point. The pipeline calls d `distance` and b `potential`.
+    ///
+    /// # Errors
+    /// [`MeshDataError`] if the values are not one a point, or the name does not fit every format.
+    pub fn with_point_field(
+        mut self,
+        name: &'a str,
+        values: &'a [f32],
+    ) -> Result<Self, MeshDataError> {
+        let field = checked(&self.point_fields, name, values, self.mesh.points().len())?;
+        self.point_fields.push(field);
+        Ok(self)
+    }
+
+    /// The same with a value in each cell.
+    ///
+    /// # Errors
+    /// [`MeshDataError`] if the values are not one a cell, or the name does not fit every format.
+    pub fn with_cell_field(
+        mut self,
+        name: &'a str,
+        values: &'a [f32],
+    ) -> Result<Self, MeshDataError> {
+        let field = checked(&self.cell_fields, name, values, self.mesh.cell_count())?;
+        self.cell_fields.push(field);
+        Ok(self)
+    }
+
+    /// The same with the frame of the image that the mesh follows.
+    pub fn with_frame(mut self, frame: &'a Frame<D>) -> Self {
+        self.frame = Some(frame);
+        self
+    }
+
+    /// The same with its provenance.
+    pub fn with_provenance(mut self, provenance: &'a Provenance) -> Self {
+        self.provenance = Some(provenance);
+        self
+    }
+
+    /// The mesh, in world coordinates.
+    pub fn mesh(&self) -> &'a Mesh<D> {
+        self.mesh
+    }
+
+    /// The values at the points.
+    pub fn point_fields(&self) -> &[Field<'a>] {
+        &self.point_fields
+    }
+
+    /// The values in the cells.
+    pub fn cell_fields(&self) -> &[Field<'a>] {
+        &self.cell_fields
+    }
+
+    /// The frame of the image, if it is known.
+    pub fn frame(&self) -> Option<&'a Frame<D>> {
+        self.frame
+    }
+
+    /// The provenance, if it is known.
+    pub fn provenance(&self) -> Option<&'a Provenance> {
+        self.provenance
+    }
+}
+
+/// A field whose name is new among `others` and whose values are `expected` in number.
+fn checked<'a>(
+    others: &[Field<'_>],
+    name: &'a str,
+    values: &'a [f32],
+    expected: usize,
+) -> Result<Field<'a>, MeshDataError> {
+    let plain = |c: u8| c.is_ascii_alphanumeric() || b"_-.".contains(&c);
+    let fits = (1..=64).contains(&name.len()) && name.bytes().all(plain);
+    if !fits || others.iter().any(|f| f.name == name) {
+        return Err(MeshDataError::FieldName { name: name.into() });
+    }
+    if values.len() != expected {
+        return Err(MeshDataError::FieldLength {
+            name: name.into(),
+            expected,
+            found: values.len(),
+        });
+    }
+    Ok(Field { name, values })
+}
+
+/// A named value for each point, as read from a file.
+#[derive(Clone, Debug, PartialEq)]
+pub struct OwnedField {
+    /// The name in the file.
+    pub name: String,
+    /// One value for each point.
+    pub values: Vec<f32>,
+}
+
+/// A mesh as read from a file.
+#[derive(Clone, Debug, PartialEq)]
+pub struct LoadedMesh<const D: usize> {
+    /// The mesh, in world coordinates, with cells in the file's order and orientation.
+    pub mesh: Mesh<D>,
+    /// The scalar fields at the points, in the file's order; other fields are left out.
+    pub point_fields: Vec<OwnedField>,
+    /// The frame of the image that the mesh follows, if atomesh wrote the file.
+    pub frame: Option<Frame<D>>,
+    /// The provenance, if atomesh wrote the file.
+    pub provenance: Option<Provenance>,
+    /// Cells that a triangle or tetrahedral mesh has no room for (points, lines, surface triangles
+    /// of a volume mesh, quadrilaterals ...) and that were left out: how many.
+    pub skipped_cells: usize,
+}
+
+impl<const D: usize> LoadedMesh<D> {
+    /// The values of the field of that name.
+    pub fn point_field(&self, name: &str) -> Option<&[f32]> {
+        self.point_fields.iter().find(|f| f.name == name).map(|f| f.values.as_slice())
+    }
+}
+
+/// A mesh whose dimension the file decides.
+#[derive(Clone, Debug, PartialEq)]
+pub enum AnyMesh {
+    /// Triangles in a plane of constant z.
+    Flat(LoadedMesh<2>),
+    /// Tetrahedra.
+    Volume(LoadedMesh<3>),
+}

@@ -1,0 +1,68 @@
+//! The frame and the provenance of a mesh as one JSON text, which every format carries.
+
+use atomesh::image::Frame;
+use serde_json::{Value, json};
+
+use super::data::{MeshData, Provenance};
+
+/// The name under which formats that name their arrays keep the text.
+pub(super) const NAME: &str = "atomesh";
+
+/// The text for a mesh; the same for the same data.
+pub(super) fn encode<const D: usize>(data: &MeshData<D>) -> String {
+    let mut object = serde_json::Map::new();
+    if let Some(p) = data.provenance() {
+        object.insert("version".into(), p.version.clone().into());
+        object.insert("seed".into(), p.seed.into());
+        object.insert("options".into(), p.options.clone());
+    }
+    if let Some(f) = data.frame() {
+        object.insert(
+            "frame".into(),
+            json!({
+                "shape": f.shape().as_slice(),
+                "spacing": f.spacing().as_slice(),
+                "origin": f.origin().as_slice(),
+                "direction": f.direction().iter().map(<[f64; D]>::as_slice).collect::<Vec<_>>(),
+            }),
+        );
+    }
+    Value::Object(object).to_string()
+}
+
+/// What a file's text says; nothing where it does not say it as [`encode`] does.
+#[derive(Clone, Debug, Default)]
+pub(super) struct Metadata(Value);
+
+impl Metadata {
+    /// Reads the text; text that is not JSON says nothing.
+    pub fn decode(text: &[u8]) -> Self {
+        Self(serde_json::from_slice(text).unwrap_or_default())
+    }
+
+    /// The provenance.
+    pub fn provenance(&self) -> Option<Provenance> {
+        Some(Provenance {
+            version: self.0.get("version")?.as_str()?.into(),
+            options: self.0.get("options")?.clone(),
+            seed: self.0.get("seed")?.as_u64()?,
+        })
+    }
+
+    /// The frame, if it has `D` axes and is a valid one.
+    pub fn frame<const D: usize>(&self) -> Option<Frame<D>> {
+        let frame = self.0.get("frame")?;
+        let shape = axes(frame.get("shape")?, |v| usize::try_from(v.as_u64()?).ok())?;
+        let spacing = axes(frame.get("spacing")?, Value::as_f64)?;
+        let origin = axes(frame.get("origin")?, Value::as_f64)?;
+        let direction = axes(frame.get("direction")?, |row| axes(row, Value::as_f64))?;
+        let frame = Frame::new(shape).ok()?;
+        frame.with_spacing(spacing).ok()?.with_origin(origin).ok()?.with_direction(direction).ok()
+    }
+}
+
+/// One value for each axis.
+fn axes<T, const D: usize>(value: &Value, read: impl Fn(&Value) -> Option<T>) -> Option<[T; D]> {
+    let values: Option<Vec<T>> = value.as_array()?.iter().map(read).collect();
+    values?.try_into().ok()
+}

@@ -1,0 +1,10 @@
+//! VTU, VTK's XML format for unstructured grids.
+
+mod write;
+
+pub use write::write_vtu;
+
+/// VTK's number for a triangle (`dimension` 2) or a tetrahedron (3).
+pub(super) fn cell_type(dimension: usize) -> u8 {
+    if dimension == 2 { 5 } else { 10 }
+}
