@@ -1,1 +1,23 @@
-//! x
+//! Pictures of meshes over images: PNG by a small rasteriser, SVG by hand, no fonts.
+//!
+//! [`draw_flat`] lays a triangular mesh over its image, as in figure 2 of Hale (2001), or atoms over a
+//! field, as in his figure 5; `draw_slices` lays the cuts of a tetrahedral mesh over the three
+//! orthogonal slices of its image, as in his figure 9. Both return a [`Picture`], a list of what to
+//! draw and where, which becomes PNG or SVG; the same input gives the same bytes.
+//!
+//! Meshes are given in *sample coordinates*: lattice coordinates divided by the grid's step. Row 0 is
+//! on top, x grows to the right. A sample covers the square around its centre, so a picture reaches
+//! half a sample beyond the mesh.
+
+mod error;
+mod flat;
+mod picture;
+mod png_encode;
+mod raster;
+mod style;
+mod svg;
+
+pub use error::DrawError;
+pub use flat::draw_flat;
+pub use picture::{Picture, PictureFormat};
+pub use style::{Color, Style};

@@ -1,0 +1,41 @@
+//! What can go wrong with a picture.
+
+use std::path::PathBuf;
+
+/// Why there is no picture.
+#[derive(Clone, Debug, PartialEq, thiserror::Error)]
+#[non_exhaustive]
+pub enum DrawError {
+    /// A file's name does not say which kind of picture it is.
+    #[error("{path:?} is no picture by its name; expected .png or .svg")]
+    Format {
+        /// The name.
+        path: PathBuf,
+    },
+    /// A slice lies outside the image.
+    #[error("slice {at} along axis {axis} of an image with {count} samples")]
+    Slice {
+        /// 0 for x, 1 for y, 2 for z.
+        axis: usize,
+        /// The sample asked for.
+        at: usize,
+        /// The samples along the axis.
+        count: usize,
+    },
+    /// A length or brightness of the style has no meaning.
+    #[error("{name} is {value}; expected a finite number above 0{}", limit.map_or(String::new(), |l| format!(" and up to {l}")))]
+    Style {
+        /// The field of [`Style`](crate::Style).
+        name: &'static str,
+        /// Its value.
+        value: f64,
+        /// The greatest value allowed, if there is one.
+        limit: Option<f64>,
+    },
+    /// The picture could not be encoded.
+    #[error("the picture could not be encoded as PNG: {reason}")]
+    Png {
+        /// What the encoder said.
+        reason: String,
+    },
+}

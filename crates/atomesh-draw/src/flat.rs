@@ -1,0 +1,87 @@
+//! A triangular mesh over its image.
+
+use atomesh::image::Image;
+use atomesh::mesh::Mesh;
+
+use crate::picture::{Picture, Place, Rect, Shape};
+use crate::raster::Ramp;
+use crate::{DrawError, Style};
+
+/// Draws a mesh over an image, as in figure 2 of Hale (2001): greys from black at the least to
+/// [`Style::brightness`] at the greatest sample, edges and, if wanted, atoms on top.
+///
+/// The image may be any field on the grid: the image itself, b, or d as in figure 5. The mesh is in
+/// sample coordinates. Cost: O(pixels + samples + cells log cells).
+///
+/// # Errors
+/// [`DrawError::Style`] if a number of the style has no meaning.
+pub fn draw_flat(image: &Image<2>, mesh: &Mesh<2>, style: &Style) -> Result<Picture, DrawError> {
+    let style = style.checked()?;
+    let frame = image.frame();
+    let [columns, rows] = frame.shape();
+    let step = frame.grid(style.units).step;
+    let edges = edges(mesh);
+    let extent = [columns as f64 * step[0], rows as f64 * step[1]];
+    let scale = scale(median_length(mesh, &edges, &step), &extent, style);
+    let pixels: Place = std::array::from_fn(|k| step[k] * scale);
+    let place = |p: &[f64; 2]| -> Place { std::array::from_fn(|k| (p[k] + 0.5) * pixels[k]) };
+
+    let mut picture = Picture::new(extent.map(|e| e * scale));
+    let ramp = Ramp::robust(image.samples(), style.brightness);
+    let raster = ramp.raster(image.samples(), columns, rows, |i, j| i + columns * j);
+    let rect = Rect { corner: [0.0; 2], size: extent.map(|e| e * scale) };
+    picture.shapes.push(Shape::Image { raster, rect });
+    let points = mesh.points();
+    if style.edges {
+        let lines = edges.iter().map(|e| e.map(|i| place(&points[i as usize]))).collect();
+        let (width, color) = (style.edge_width, style.edge_color);
+        picture.shapes.push(Shape::Lines { lines, width, color });
+    }
+    if style.atoms {
+        let centers = points.iter().map(place).collect();
+        let (radius, color) = (1.6 * style.edge_width, style.atom_color);
+        picture.shapes.push(Shape::Discs { centers, radius, color });
+    }
+    Ok(picture)
+}
+
+/// The edges of all cells, each once, lesser point first, in order.
+pub(crate) fn edges<const D: usize>(mesh: &Mesh<D>) -> Vec<[u32; 2]> {
+    let mut edges = Vec::new();
+    for cell in mesh.cells() {
+        for (i, &a) in cell.iter().enumerate() {
+            edges.extend(cell[i + 1..].iter().map(|&b| [a.min(b), a.max(b)]));
+        }
+    }
+    edges.sort_unstable();
+    edges.dedup();
+    edges
+}
+
+/// The median length of the edges, of samples with sides `step`; `None` without edges.
+pub(crate) fn median_length<const D: usize>(
+    mesh: &Mesh<D>,
+    edges: &[[u32; 2]],
+    step: &[f64; D],
+) -> Option<f64> {
+    let points = mesh.points();
+    let mut lengths: Vec<f64> = edges
+        .iter()
+        .map(|&[a, b]| {
+            let (a, b) = (&points[a as usize], &points[b as usize]);
+            (0..D).map(|k| ((a[k] - b[k]) * step[k]).powi(2)).sum::<f64>().sqrt()
+        })
+        .collect();
+    let middle = lengths.len() / 2;
+    (!lengths.is_empty()).then(|| *lengths.select_nth_unstable_by(middle, f64::total_cmp).1)
+}
+
+/// Pixels to a unit of length, so that an edge of the given length is as long as the style wants it,
+/// or else the picture of that extent as large as it may be.
+pub(crate) fn scale(edge: Option<f64>, extent: &[f64; 2], style: &Style) -> f64 {
+    let largest = style.max_side / extent[0].max(extent[1]);
+    match edge {
+        Some(edge) if edge > 0.0 => largest.min(style.edge_pixels / edge),
+        _ => largest,
+    }
+}

@@ -1,0 +1,92 @@
+//! A picture: what is drawn where, in pixels, x to the right and y down.
+
+use std::path::Path;
+
+use crate::raster::Raster;
+use crate::{Color, DrawError, png_encode, svg};
+
+/// A place in a picture, in pixels from its upper left corner.
+pub(crate) type Place = [f64; 2];
+
+/// A rectangle: its upper left corner and its size.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub(crate) struct Rect {
+    pub corner: Place,
+    pub size: Place,
+}
+
+/// Something to draw; later shapes cover earlier ones.
+#[derive(Clone, Debug)]
+pub(crate) enum Shape {
+    /// Greys stretched over a rectangle, each sample a rectangle of one grey.
+    Image { raster: Raster, rect: Rect },
+    /// A filled rectangle.
+    Fill { rect: Rect, color: Color },
+    /// Straight lines, round at their ends.
+    Lines { lines: Vec<[Place; 2]>, width: f64, color: Color },
+    /// Filled discs of one radius.
+    Discs { centers: Vec<Place>, radius: f64, color: Color },
+    /// Filled squares of one half side.
+    Squares { centers: Vec<Place>, half: f64, color: Color },
+}
+
+/// The kinds of picture files.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
+pub enum PictureFormat {
+    /// Portable Network Graphics, 8 bits a colour.
+    Png,
+    /// Scalable Vector Graphics, with the image embedded.
+    Svg,
+}
+
+impl PictureFormat {
+    /// The kind that a file's name calls for by its extension, in any case.
+    ///
+    /// # Errors
+    /// [`DrawError::Format`] unless the extension is png or svg.
+    pub fn of(path: &Path) -> Result<Self, DrawError> {
+        let extension = path.extension().unwrap_or_default().to_ascii_lowercase();
+        match extension.to_str() {
+            Some("png") => Ok(Self::Png),
+            Some("svg") => Ok(Self::Svg),
+            _ => Err(DrawError::Format { path: path.into() }),
+        }
+    }
+}
+
+/// A picture, ready to be encoded.
+#[derive(Clone, Debug)]
+pub struct Picture {
+    pub(crate) width: u32,
+    pub(crate) height: u32,
+    pub(crate) shapes: Vec<Shape>,
+}
+
+impl Picture {
+    /// A white picture large enough for `size`.
+    pub(crate) fn new(size: Place) -> Self {
+        let whole = |s: f64| s.ceil().max(1.0) as u32;
+        Self { width: whole(size[0]), height: whole(size[1]), shapes: vec![] }
+    }
+
+    /// The width in pixels.
+    pub fn width(&self) -> u32 {
+        self.width
+    }
+
+    /// The height in pixels.
+    pub fn height(&self) -> u32 {
+        self.height
+    }
+
+    /// The bytes of a file of that kind; the same for the same picture.
+    ///
+    /// # Errors
+    /// [`DrawError::Png`] if the PNG encoder fails, as it may for lack of memory.
+    pub fn encode(&self, format: PictureFormat) -> Result<Vec<u8>, DrawError> {
+        match format {
+            PictureFormat::Png => png_encode::encode(self),
+            PictureFormat::Svg => svg::encode(self),
+        }
+    }
+}

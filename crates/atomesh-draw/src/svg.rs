@@ -1,0 +1,106 @@
+//! Pictures as SVG text. Coordinates have two decimals: a hundredth of a pixel.
+
+use std::fmt::Write;
+
+use base64::Engine;
+use base64::engine::general_purpose::STANDARD;
+
+use crate::picture::{Picture, Shape};
+use crate::{Color, DrawError, png_encode};
+
+/// The picture as SVG.
+pub(crate) fn encode(picture: &Picture) -> Result<Vec<u8>, DrawError> {
+    let (w, h) = (picture.width, picture.height);
+    let mut out = format!(
+        "<svg xmlns=\"http://www.w3.org/2000/svg\" width=\"{w}\" height=\"{h}\" viewBox=\"0 0 {w} {h}\">\n\
+         <path fill=\"#ffffff\" d=\"M0 0H{w}V{h}H0Z\"/>\n"
+    );
+    for shape in &picture.shapes {
+        draw(&mut out, shape)?;
+    }
+    out.push_str("</svg>\n");
+    Ok(out.into_bytes())
+}
+
+fn draw(out: &mut String, shape: &Shape) -> Result<(), DrawError> {
+    match shape {
+        Shape::Image { raster, rect } => {
+            let png = STANDARD.encode(png_encode::encode_raster(raster)?);
+            let [[x, y], [w, h]] = [rect.corner, rect.size].map(|p| p.map(number));
+            line(
+                out,
+                format_args!(
+                    "<image x=\"{x}\" y=\"{y}\" width=\"{w}\" height=\"{h}\" preserveAspectRatio=\"none\" \
+                     style=\"image-rendering:pixelated\" href=\"data:image/png;base64,{png}\"/>"
+                ),
+            );
+        }
+        Shape::Fill { rect, color } => {
+            let [[x, y], [w, h]] = [rect.corner, rect.size].map(|p| p.map(number));
+            let color = hex(*color);
+            line(
+                out,
+                format_args!(
+                    "<rect x=\"{x}\" y=\"{y}\" width=\"{w}\" height=\"{h}\" fill=\"{color}\"/>"
+                ),
+            );
+        }
+        Shape::Lines { lines, width, color } => {
+            let (color, width) = (hex(*color), number(*width));
+            let mut d = String::new();
+            for (i, [a, b]) in lines.iter().enumerate() {
+                if i == 0 || lines[i - 1][1] != *a {
+                    point(&mut d, 'M', *a);
+                }
+                point(&mut d, 'L', *b);
+            }
+            line(
+                out,
+                format_args!(
+                    "<path fill=\"none\" stroke=\"{color}\" stroke-width=\"{width}\" \
+                     stroke-linecap=\"round\" stroke-linejoin=\"round\" d=\"{d}\"/>"
+                ),
+            );
+        }
+        Shape::Discs { centers, radius, color } => dots(out, centers, *radius, "round", *color),
+        Shape::Squares { centers, half, color } => dots(out, centers, *half, "square", *color),
+    }
+    Ok(())
+}
+
+/// Lines of no length, whose caps are discs or squares.
+fn dots(out: &mut String, centers: &[[f64; 2]], half: f64, cap: &str, color: Color) {
+    let (color, width) = (hex(color), number(2.0 * half));
+    let mut d = String::new();
+    for c in centers {
+        point(&mut d, 'M', *c);
+        d.push_str("h0");
+    }
+    line(
+        out,
+        format_args!(
+            "<path fill=\"none\" stroke=\"{color}\" stroke-width=\"{width}\" \
+             stroke-linecap=\"{cap}\" d=\"{d}\"/>"
+        ),
+    );
+}
+
+fn line(out: &mut String, text: std::fmt::Arguments) {
+    out.write_fmt(text).expect("a String takes all text");
+    out.push('\n');
+}
+
+fn point(d: &mut String, command: char, [x, y]: [f64; 2]) {
+    write!(d, "{command}{} {}", number(x), number(y)).expect("a String takes all text");
+}
+
+/// A number with at most two decimals.
+fn number(x: f64) -> String {
+    let text = format!("{x:.2}");
+    let text = text.trim_end_matches('0').trim_end_matches('.');
+    if text == "-0" { "0".into() } else { text.into() }
+}
+
+fn hex([r, g, b]: Color) -> String {
+    format!("#{r:02x}{g:02x}{b:02x}")
+}
