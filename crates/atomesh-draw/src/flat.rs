@@ -1,5 +1,6 @@
 //! A triangular mesh over its image.
 
+use atomesh::geometry::{Point, difference, dot};
 use atomesh::image::Image;
 use atomesh::mesh::Mesh;
 
@@ -20,9 +21,8 @@ pub fn draw_flat(image: &Image<2>, mesh: &Mesh<2>, style: &Style) -> Result<Pict
     let frame = image.frame();
     let [columns, rows] = frame.shape();
     let step = frame.grid(style.units).step;
-    let edges = edges(mesh);
     let extent = [columns as f64 * step[0], rows as f64 * step[1]];
-    let scale = scale(median_length(mesh, &edges, &step), &extent, style);
+    let scale = scale(typical_length(mesh, &step), &extent, style);
     let pixels: Place = std::array::from_fn(|k| step[k] * scale);
     let place = |p: &[f64; 2]| -> Place { std::array::from_fn(|k| (p[k] + 0.5) * pixels[k]) };
 
@@ -33,7 +33,7 @@ pub fn draw_flat(image: &Image<2>, mesh: &Mesh<2>, style: &Style) -> Result<Pict
     picture.shapes.push(Shape::Image { raster, rect });
     let points = mesh.points();
     if style.edges {
-        let lines = edges.iter().map(|e| e.map(|i| place(&points[i as usize]))).collect();
+        let lines = edges(mesh).iter().map(|e| e.map(|i| place(&points[i as usize]))).collect();
         let (width, color) = (style.edge_width, style.edge_color);
         picture.shapes.push(Shape::Lines { lines, width, color });
     }
@@ -46,7 +46,7 @@ pub fn draw_flat(image: &Image<2>, mesh: &Mesh<2>, style: &Style) -> Result<Pict
 }
 
 /// The edges of all cells, each once, lesser point first, in order.
-pub(crate) fn edges<const D: usize>(mesh: &Mesh<D>) -> Vec<[u32; 2]> {
+fn edges<const D: usize>(mesh: &Mesh<D>) -> Vec<[u32; 2]> {
     let mut edges = Vec::new();
     for cell in mesh.cells() {
         for (i, &a) in cell.iter().enumerate() {
@@ -58,20 +58,23 @@ pub(crate) fn edges<const D: usize>(mesh: &Mesh<D>) -> Vec<[u32; 2]> {
     edges
 }
 
-/// The median length of the edges, of samples with sides `step`; `None` without edges.
-pub(crate) fn median_length<const D: usize>(
-    mesh: &Mesh<D>,
-    edges: &[[u32; 2]],
-    step: &[f64; D],
-) -> Option<f64> {
+/// Cells looked at to find the typical length of edges.
+const LOOKS: usize = 1 << 14;
+
+/// The median length of the edges of cells spread over the mesh, of samples with sides `step`; `None`
+/// without cells.
+pub(crate) fn typical_length<const D: usize>(mesh: &Mesh<D>, step: &[f64; D]) -> Option<f64> {
     let points = mesh.points();
-    let mut lengths: Vec<f64> = edges
-        .iter()
-        .map(|&[a, b]| {
-            let (a, b) = (&points[a as usize], &points[b as usize]);
-            (0..D).map(|k| ((a[k] - b[k]) * step[k]).powi(2)).sum::<f64>().sqrt()
-        })
-        .collect();
+    let mut lengths = Vec::new();
+    for cell in mesh.cells().step_by(mesh.cell_count().div_ceil(LOOKS).max(1)) {
+        for (i, &a) in cell.iter().enumerate() {
+            for &b in &cell[i + 1..] {
+                let edge = difference(&points[b as usize], &points[a as usize]);
+                let edge: Point<D> = std::array::from_fn(|k| edge[k] * step[k]);
+                lengths.push(dot(&edge, &edge).sqrt());
+            }
+        }
+    }
     let middle = lengths.len() / 2;
     (!lengths.is_empty()).then(|| *lengths.select_nth_unstable_by(middle, f64::total_cmp).1)
 }

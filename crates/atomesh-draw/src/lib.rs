@@ -1,7 +1,7 @@
 //! Pictures of meshes over images: PNG by a small rasteriser, SVG by hand, no fonts.
 //!
 //! [`draw_flat`] lays a triangular mesh over its image, as in figure 2 of Hale (2001), or atoms over a
-//! field, as in his figure 5; `draw_slices` lays the cuts of a tetrahedral mesh over the three
+//! field, as in his figure 5; [`draw_slices`] lays the cuts of a tetrahedral mesh over the three
 //! orthogonal slices of its image, as in his figure 9. Both return a [`Picture`], a list of what to
 //! draw and where, which becomes PNG or SVG; the same input gives the same bytes.
 //!
@@ -11,13 +11,16 @@
 
 mod error;
 mod flat;
+mod label;
 mod picture;
 mod png_encode;
 mod raster;
+mod slices;
 mod style;
 mod svg;
 
 pub use error::DrawError;
 pub use flat::draw_flat;
 pub use picture::{Picture, PictureFormat};
+pub use slices::draw_slices;
 pub use style::{Color, Style};
