@@ -3,6 +3,9 @@
 use atomesh::image::Frame;
 use atomesh::mesh::Mesh;
 
+/// Names that some format gives to other arrays.
+const RESERVED: [&str; 4] = ["points", "cells", "metadata", super::metadata::NAME];
+
 /// What is wrong with the parts of a [`MeshData`].
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]
 #[non_exhaustive]
@@ -19,7 +22,7 @@ pub enum MeshDataError {
     },
     /// A name that not every format can hold.
     #[error(
-        "field name {name:?}; expected one that no other field has, of 1 to 64 letters, digits, '_', '-' or '.'"
+        "field name {name:?}; expected 1 to 64 letters, digits, '_' or '-', other than those of other fields and {RESERVED:?}"
     )]
     FieldName {
         /// The name found.
@@ -148,9 +151,9 @@ fn checked<'a>(
     values: &'a [f32],
     expected: usize,
 ) -> Result<Field<'a>, MeshDataError> {
-    let plain = |c: u8| c.is_ascii_alphanumeric() || b"_-.".contains(&c);
+    let plain = |c: u8| c.is_ascii_alphanumeric() || b"_-".contains(&c);
     let fits = (1..=64).contains(&name.len()) && name.bytes().all(plain);
-    if !fits || others.iter().any(|f| f.name == name) {
+    if !fits || RESERVED.contains(&name) || others.iter().any(|f| f.name == name) {
         return Err(MeshDataError::FieldName { name: name.into() });
     }
     if values.len() != expected {

@@ -7,6 +7,9 @@
 mod column;
 mod data;
 mod metadata;
+pub mod msh;
+pub mod npz;
+pub mod vtk;
 pub mod vtu;
 
 use std::io;
@@ -17,6 +20,7 @@ use atomesh::watch::{Cancelled, Watch};
 pub use data::{AnyMesh, Field, LoadedMesh, MeshData, MeshDataError, OwnedField, Provenance};
 
 use crate::atomic_file::AtomicFile;
+use msh::{MshEncoding, MshVersion};
 
 /// The formats of mesh files.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
@@ -24,11 +28,17 @@ use crate::atomic_file::AtomicFile;
 pub enum MeshFormat {
     /// VTK's XML unstructured grid: binary, compressed.
     Vtu,
+    /// VTK's legacy format: binary, not compressed.
+    Vtk,
+    /// Gmsh's format.
+    Msh(MshVersion, MshEncoding),
+    /// NumPy's archive of arrays.
+    Npz,
 }
 
 impl MeshFormat {
     /// The extensions that [`of`](Self::of) knows, for messages.
-    pub const EXTENSIONS: &'static str = ".vtu";
+    pub const EXTENSIONS: &'static str = ".vtu, .vtk, .msh (Gmsh 4.1), .msh2 (Gmsh 2.2), .npz";
 
     /// The format that a file's name calls for by its extension, in any case.
     ///
@@ -38,6 +48,10 @@ impl MeshFormat {
         let extension = path.extension().unwrap_or_default().to_ascii_lowercase();
         match extension.to_str() {
             Some("vtu") => Ok(Self::Vtu),
+            Some("vtk") => Ok(Self::Vtk),
+            Some("msh") => Ok(Self::Msh(MshVersion::V41, MshEncoding::Binary)),
+            Some("msh2") => Ok(Self::Msh(MshVersion::V22, MshEncoding::Binary)),
+            Some("npz") => Ok(Self::Npz),
             _ => Err(UnknownMeshFormat { path: path.into() }),
         }
     }
@@ -61,6 +75,16 @@ pub enum MeshWriteError {
     /// The system did not take the bytes.
     #[error("the mesh could not be written: {0}")]
     Io(#[from] io::Error),
+    /// There are more points or cells than the format can count.
+    #[error("{format} cannot hold {count} points or cells, only {limit}")]
+    TooMany {
+        /// The format.
+        format: &'static str,
+        /// How many there are.
+        count: usize,
+        /// How many there may be.
+        limit: usize,
+    },
     /// The watch ended the work.
     #[error(transparent)]
     Cancelled(#[from] Cancelled),
@@ -70,16 +94,34 @@ pub enum MeshWriteError {
 /// not at all.
 ///
 /// # Errors
-/// [`MeshWriteError`] if the format is unknown, the file cannot be written, or the watch ends the work.
+/// [`MeshWriteError`] if the format is unknown or cannot hold the mesh, the file cannot be written, or
+/// the watch ends the work.
 pub fn write_mesh<const D: usize>(
     path: &Path,
     data: &MeshData<D>,
     watch: &mut dyn Watch,
 ) -> Result<(), MeshWriteError> {
-    let format = MeshFormat::of(path)?;
+    write_mesh_as(path, MeshFormat::of(path)?, data, watch)
+}
+
+/// Writes a mesh in the given format, whatever the name is. The file appears whole or not at all.
+///
+/// # Errors
+/// As [`write_mesh`].
+pub fn write_mesh_as<const D: usize>(
+    path: &Path,
+    format: MeshFormat,
+    data: &MeshData<D>,
+    watch: &mut dyn Watch,
+) -> Result<(), MeshWriteError> {
     let mut file = AtomicFile::create(path)?;
     match format {
         MeshFormat::Vtu => vtu::write_vtu(&mut file, data, watch)?,
+        MeshFormat::Vtk => vtk::write_vtk(&mut file, data, watch)?,
+        MeshFormat::Msh(version, encoding) => {
+            msh::write_msh(&mut file, data, (version, encoding), watch)?;
+        }
+        MeshFormat::Npz => npz::write_npz(&mut file, data, watch)?,
     }
     Ok(file.commit()?)
 }

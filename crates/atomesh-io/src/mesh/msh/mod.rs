@@ -1,0 +1,32 @@
+//! MSH, the format of Gmsh: versions 4.1 and 2.2, binary and text.
+//!
+//! Points and cells are numbered from 1 in the mesh's order and belong to one entity, numbered 1.
+//! Fields at points are `$NodeData`, fields in cells `$ElementData`. The frame and the provenance are
+//! JSON in `$Comments`, a section that Gmsh passes over.
+
+mod write;
+
+pub use write::write_msh;
+
+/// The versions of the format.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
+pub enum MshVersion {
+    /// 4.1, of Gmsh 4.
+    V41,
+    /// 2.2, which most other programs read.
+    V22,
+}
+
+/// How numbers are written.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
+pub enum MshEncoding {
+    /// Little-endian bytes.
+    Binary,
+    /// Decimal text; reals have the 17 digits that determine them.
+    Text,
+}
+
+/// Gmsh's number for a triangle (`dimension` 2) or a tetrahedron (3).
+pub(super) fn element_type(dimension: usize) -> i32 {
+    if dimension == 2 { 2 } else { 4 }
+}

@@ -1,0 +1,265 @@
+//! Writing MSH.
+
+use std::io::Write;
+
+use atomesh::mesh::Mesh;
+use atomesh::watch::{Phase, Watch, check};
+
+use super::super::column::{Endian, Number};
+use super::super::data::{Field, MeshData};
+use super::super::{MeshWriteError, metadata};
+use super::{MshEncoding, MshVersion, element_type};
+
+/// Bytes gathered before they are handed on.
+const CHUNK: usize = 1 << 18;
+
+/// Cells or points between two looks at the watch.
+const ITEMS_PER_STEP: usize = 1 << 18;
+
+/// Writes a mesh as MSH.
+///
+/// # Errors
+/// If there are more points or cells than the format's 32-bit numbers can name, `out` cannot be
+/// written to, or the watch ends the work.
+pub fn write_msh<const D: usize>(
+    out: &mut impl Write,
+    data: &MeshData<D>,
+    (version, encoding): (MshVersion, MshEncoding),
+    watch: &mut dyn Watch,
+) -> Result<(), MeshWriteError> {
+    let count = data.mesh().points().len().max(data.mesh().cell_count());
+    if i32::try_from(count).is_err() {
+        return Err(MeshWriteError::TooMany { format: "MSH", count, limit: i32::MAX as usize });
+    }
+    let steps = 2 + data.point_fields().len() + data.cell_fields().len();
+    let items = (steps * count.max(1)) as f64;
+    let mut numbers = Numbers { out, bytes: vec![], encoding, watch, done: 0, items };
+    numbers.head(version, &metadata::encode(data))?;
+    match version {
+        MshVersion::V41 => {
+            nodes_41(&mut numbers, data.mesh())?;
+            elements_41(&mut numbers, data.mesh())?;
+        }
+        MshVersion::V22 => {
+            nodes_22(&mut numbers, data.mesh())?;
+            elements_22(&mut numbers, data.mesh())?;
+        }
+    }
+    for field in data.point_fields() {
+        field_data(&mut numbers, "NodeData", field)?;
+    }
+    for field in data.cell_fields() {
+        field_data(&mut numbers, "ElementData", field)?;
+    }
+    numbers.flush()
+}
+
+/// Writes numbers in the chosen encoding.
+struct Numbers<'a, W> {
+    out: &'a mut W,
+    bytes: Vec<u8>,
+    encoding: MshEncoding,
+    watch: &'a mut dyn Watch,
+    done: usize,
+    items: f64,
+}
+
+impl<W: Write> Numbers<'_, W> {
+    fn text(&mut self, text: &str) {
+        self.bytes.extend_from_slice(text.as_bytes());
+    }
+
+    fn put<T: Number + std::fmt::Display>(&mut self, value: T) {
+        match self.encoding {
+            MshEncoding::Binary => value.put(Endian::Little, &mut self.bytes),
+            MshEncoding::Text => self.text(&format!("{value} ")),
+        }
+    }
+
+    fn int(&mut self, value: usize) {
+        self.put(value as i32); // counts were checked to fit
+    }
+
+    fn size(&mut self, value: usize) {
+        self.put(value as u64);
+    }
+
+    fn ints<const N: usize>(&mut self, values: [usize; N]) {
+        values.into_iter().for_each(|v| self.int(v));
+    }
+
+    fn sizes<const N: usize>(&mut self, values: [usize; N]) {
+        values.into_iter().for_each(|v| self.size(v));
+    }
+
+    fn real(&mut self, value: f64) {
+        match self.encoding {
+            MshEncoding::Binary => value.put(Endian::Little, &mut self.bytes),
+            MshEncoding::Text => self.text(&format!("{value:.16e} ")),
+        }
+    }
+
+    /// Ends a line of text; binary numbers have no lines.
+    fn line(&mut self) {
+        if self.encoding == MshEncoding::Text {
+            self.bytes.pop_if(|b| *b == b' ');
+            self.bytes.push(b'\n');
+        }
+    }
+
+    /// Ends a point or cell.
+    fn item(&mut self) -> Result<(), MeshWriteError> {
+        self.line();
+        self.done += 1;
+        if self.done % ITEMS_PER_STEP == 0 {
+            check(self.watch, Phase::Write, (self.done as f64 / self.items).min(1.0), None)?;
+        }
+        if self.bytes.len() >= CHUNK { self.flush() } else { Ok(()) }
+    }
+
+    /// Ends a section; binary numbers are followed by a line break.
+    fn end(&mut self, section: &str) {
+        if self.encoding == MshEncoding::Binary {
+            self.bytes.push(b'\n');
+        }
+        self.text(&format!("$End{section}\n"));
+    }
+
+    fn flush(&mut self) -> Result<(), MeshWriteError> {
+        self.out.write_all(&self.bytes)?;
+        self.bytes.clear();
+        Ok(())
+    }
+
+    fn head(&mut self, version: MshVersion, metadata: &str) -> Result<(), MeshWriteError> {
+        let version = match version {
+            MshVersion::V41 => "4.1",
+            MshVersion::V22 => "2.2",
+        };
+        match self.encoding {
+            MshEncoding::Binary => {
+                self.text(&format!("$MeshFormat\n{version} 1 8\n"));
+                self.int(1); // tells the order of the bytes
+                self.end("MeshFormat");
+            }
+            MshEncoding::Text => {
+                self.text(&format!("$MeshFormat\n{version} 0 8\n$EndMeshFormat\n"));
+            }
+        }
+        // "$" opens and closes sections; JSON can do without it
+        let metadata = metadata.replace('$', "\\u0024");
+        self.text(&format!("$Comments\n{metadata}\n$EndComments\n"));
+        Ok(())
+    }
+
+    fn point<const D: usize>(&mut self, p: &[f64; D]) {
+        for k in 0..3 {
+            self.real(p.get(k).copied().unwrap_or(0.0));
+        }
+    }
+}
+
+fn nodes_41<W: Write, const D: usize>(
+    to: &mut Numbers<W>,
+    mesh: &Mesh<D>,
+) -> Result<(), MeshWriteError> {
+    let count = mesh.points().len();
+    to.text("$Nodes\n");
+    to.sizes([1, count, count.min(1), count]); // blocks, points, least and greatest tag
+    to.line();
+    to.ints([D, 1, 0]); // dimension and tag of the entity, no parameters
+    to.size(count);
+    to.line();
+    for tag in 1..=count {
+        to.size(tag);
+        to.item()?;
+    }
+    for p in mesh.points() {
+        to.point(p);
+        to.item()?;
+    }
+    to.end("Nodes");
+    Ok(())
+}
+
+fn elements_41<W: Write, const D: usize>(
+    to: &mut Numbers<W>,
+    mesh: &Mesh<D>,
+) -> Result<(), MeshWriteError> {
+    let count = mesh.cell_count();
+    to.text("$Elements\n");
+    to.sizes([1, count, count.min(1), count]);
+    to.line();
+    to.ints([D, 1]);
+    to.put(element_type(D));
+    to.size(count);
+    to.line();
+    for (i, cell) in mesh.cells().enumerate() {
+        to.size(i + 1);
+        for &corner in cell {
+            to.size(corner as usize + 1);
+        }
+        to.item()?;
+    }
+    to.end("Elements");
+    Ok(())
+}
+
+fn nodes_22<W: Write, const D: usize>(
+    to: &mut Numbers<W>,
+    mesh: &Mesh<D>,
+) -> Result<(), MeshWriteError> {
+    to.text(&format!("$Nodes\n{}\n", mesh.points().len()));
+    for (i, p) in mesh.points().iter().enumerate() {
+        to.int(i + 1);
+        to.point(p);
+        to.item()?;
+    }
+    to.end("Nodes");
+    Ok(())
+}
+
+fn elements_22<W: Write, const D: usize>(
+    to: &mut Numbers<W>,
+    mesh: &Mesh<D>,
+) -> Result<(), MeshWriteError> {
+    let (kind, count) = (element_type(D), mesh.cell_count());
+    to.text(&format!("$Elements\n{count}\n"));
+    let text = to.encoding == MshEncoding::Text;
+    if !text && count > 0 {
+        to.put(kind);
+        to.ints([count, 2]); // cells of that kind, each with two tags
+    }
+    for (i, cell) in mesh.cells().enumerate() {
+        to.int(i + 1);
+        if text {
+            to.put(kind);
+            to.int(2);
+        }
+        to.ints([0, 1]); // no physical group, entity 1
+        for &corner in cell {
+            to.int(corner as usize + 1);
+        }
+        to.item()?;
+    }
+    to.end("Elements");
+    Ok(())
+}
+
+/// A field, in the form that both versions share.
+fn field_data<W: Write>(
+    to: &mut Numbers<W>,
+    section: &str,
+    field: &Field,
+) -> Result<(), MeshWriteError> {
+    let (name, count) = (field.name(), field.values().len());
+    // one string: the name; one real: the time; three integers: time step, components, values
+    to.text(&format!("${section}\n1\n\"{name}\"\n1\n0\n3\n0\n1\n{count}\n"));
+    for (i, &value) in field.values().iter().enumerate() {
+        to.int(i + 1);
+        to.real(value.into());
+        to.item()?;
+    }
+    to.end(section);
+    Ok(())
+}

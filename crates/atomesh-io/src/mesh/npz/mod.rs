@@ -1,0 +1,7 @@
+//! NPZ, NumPy's archive of arrays: `points` (n × D, float64), `cells` (m × (D + 1), uint32), one float32
+//! array by the name of each field at the points, `cell.NAME` for each field in the cells, and
+//! `metadata`, the frame and the provenance as JSON bytes: `json.loads(archive["metadata"].item())`.
+
+mod write;
+
+pub use write::write_npz;

@@ -1,0 +1,70 @@
+//! VTK's legacy format (version 3.0), binary: written.
+
+use std::io::Write;
+
+use atomesh::watch::{Phase, Watch, check};
+
+use super::column::{Column, Endian};
+use super::data::{Field, MeshData};
+use super::{MeshWriteError, metadata, vtu};
+
+/// Writes a mesh as a legacy VTK file: big-endian binary, points as double, fields as float; the frame
+/// and the provenance are JSON in the field data.
+///
+/// # Errors
+/// If the cells' list is longer than the format's 32-bit numbers can say, `out` cannot be written to,
+/// or the watch ends the work.
+pub fn write_vtk<const D: usize>(
+    out: &mut impl Write,
+    data: &MeshData<D>,
+    watch: &mut dyn Watch,
+) -> Result<(), MeshWriteError> {
+    let mesh = data.mesh();
+    let (points, cells) = (mesh.points().len(), mesh.cell_count());
+    let list = mesh.corners().len() + cells;
+    let limit = i32::MAX as usize;
+    if let Some(&count) = [points, list].iter().find(|&&n| n > limit) {
+        return Err(MeshWriteError::TooMany { format: "VTK legacy", count, limit });
+    }
+    let big = Endian::Big;
+    let text = metadata::encode(data);
+    let name = metadata::NAME;
+    writeln!(out, "# vtk DataFile Version 3.0\natomesh\nBINARY\nDATASET UNSTRUCTURED_GRID")?;
+    writeln!(out, "FIELD FieldData 1\n{name} 1 {} unsigned_char\n{text}", text.len())?;
+    check(watch, Phase::Write, 0.0, None)?;
+    writeln!(out, "POINTS {points} double")?;
+    Column::points(mesh, big).write(out)?;
+    check(watch, Phase::Write, 0.3, None)?;
+    writeln!(out, "\nCELLS {cells} {list}")?;
+    let corners = mesh.corners();
+    let each = Column::new(cells, 4 * (D + 2), move |range, bytes| {
+        for cell in corners[range.start * (D + 1)..range.end * (D + 1)].chunks_exact(D + 1) {
+            let numbers = std::iter::once(D as u32 + 1).chain(cell.iter().copied());
+            bytes.extend(numbers.flat_map(u32::to_be_bytes));
+        }
+    });
+    each.write(out)?;
+    check(watch, Phase::Write, 0.7, None)?;
+    writeln!(out, "\nCELL_TYPES {cells}")?;
+    let kind = i32::from(vtu::cell_type(D));
+    Column::numbers(cells, big, move |_| kind).write(out)?;
+    writeln!(out, "\nPOINT_DATA {points}")?;
+    fields(out, data.point_fields())?;
+    check(watch, Phase::Write, 0.9, None)?;
+    writeln!(out, "CELL_DATA {cells}")?;
+    fields(out, data.cell_fields())?;
+    Ok(())
+}
+
+fn fields(out: &mut impl Write, fields: &[Field]) -> Result<(), MeshWriteError> {
+    if fields.is_empty() {
+        return Ok(());
+    }
+    writeln!(out, "FIELD FieldData {}", fields.len())?;
+    for field in fields {
+        writeln!(out, "{} 1 {} float", field.name(), field.values().len())?;
+        Column::slice(field.values(), Endian::Big).write(out)?;
+        writeln!(out)?;
+    }
+    Ok(())
+}
