@@ -9,6 +9,7 @@ mod data;
 mod metadata;
 pub mod msh;
 pub mod npz;
+mod read;
 pub mod vtk;
 pub mod vtu;
 
@@ -18,6 +19,7 @@ use std::path::{Path, PathBuf};
 use atomesh::watch::{Cancelled, Watch};
 
 pub use data::{AnyMesh, Field, LoadedMesh, MeshData, MeshDataError, OwnedField, Provenance};
+pub use read::MeshReadError;
 
 use crate::atomic_file::AtomicFile;
 use msh::{MshEncoding, MshVersion};
@@ -124,4 +126,21 @@ pub fn write_mesh_as<const D: usize>(
         MeshFormat::Npz => npz::write_npz(&mut file, data, watch)?,
     }
     Ok(file.commit()?)
+}
+
+/// Reads a mesh in the format that the name calls for ([`MeshFormat::of`]; `.msh2` is read as `.msh`,
+/// whose version stands in the file). A file with tetrahedra is a volume, its triangles are left out; a
+/// file with triangles alone must lie in a plane of constant z.
+///
+/// # Errors
+/// [`MeshReadError`] if the format is unknown, the file cannot be read, or is not what its name says.
+pub fn read_mesh(path: &Path) -> Result<AnyMesh, MeshReadError> {
+    let format = MeshFormat::of(path)?;
+    let bytes = std::fs::read(path)?;
+    match format {
+        MeshFormat::Vtu => vtu::read_vtu(&bytes),
+        MeshFormat::Vtk => vtk::read_vtk(&bytes),
+        MeshFormat::Msh(..) => msh::read_msh(&bytes),
+        MeshFormat::Npz => npz::read_npz(&bytes),
+    }
 }

@@ -4,8 +4,10 @@
 //! Fields at points are `$NodeData`, fields in cells `$ElementData`. The frame and the provenance are
 //! JSON in `$Comments`, a section that Gmsh passes over.
 
+mod read;
 mod write;
 
+pub use read::read_msh;
 pub use write::write_msh;
 
 /// The versions of the format.

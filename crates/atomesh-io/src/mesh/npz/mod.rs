@@ -2,6 +2,8 @@
 //! array by the name of each field at the points, `cell.NAME` for each field in the cells, and
 //! `metadata`, the frame and the provenance as JSON bytes: `json.loads(archive["metadata"].item())`.
 
+mod read;
 mod write;
 
+pub use read::read_npz;
 pub use write::write_npz;

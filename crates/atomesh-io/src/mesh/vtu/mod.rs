@@ -1,7 +1,11 @@
 //! VTU, VTK's XML format for unstructured grids.
 
+mod array;
+mod read;
 mod write;
+mod xml;
 
+pub use read::read_vtu;
 pub use write::write_vtu;
 
 /// VTK's number for a triangle (`dimension` 2) or a tetrahedron (3).

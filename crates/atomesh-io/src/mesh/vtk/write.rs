@@ -1,12 +1,12 @@
-//! VTK's legacy format (version 3.0), binary: written.
+//! Writing VTK's legacy format, version 3.0, binary.
 
 use std::io::Write;
 
 use atomesh::watch::{Phase, Watch, check};
 
-use super::column::{Column, Endian};
-use super::data::{Field, MeshData};
-use super::{MeshWriteError, metadata, vtu};
+use super::super::column::{Column, Endian};
+use super::super::data::{Field, MeshData};
+use super::super::{MeshWriteError, metadata, vtu};
 
 /// Writes a mesh as a legacy VTK file: big-endian binary, points as double, fields as float; the frame
 /// and the provenance are JSON in the field data.

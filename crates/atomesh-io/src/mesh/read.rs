@@ -1,0 +1,124 @@
+//! What all mesh readers share: errors, places in the bytes, and the step from cells to a mesh.
+
+use std::io;
+
+use atomesh::mesh::{Mesh, MeshError};
+
+use super::UnknownMeshFormat;
+use super::data::{AnyMesh, LoadedMesh, OwnedField};
+use super::metadata::Metadata;
+
+/// Why a mesh was not read.
+#[derive(Debug, thiserror::Error)]
+#[non_exhaustive]
+pub enum MeshReadError {
+    /// The name calls for no known format.
+    #[error(transparent)]
+    Format(#[from] UnknownMeshFormat),
+    /// The system did not give the bytes.
+    #[error("the mesh could not be read: {0}")]
+    Io(#[from] io::Error),
+    /// The bytes are not what the format says.
+    #[error("byte {at}: expected {expected}, found {found}")]
+    Malformed {
+        /// Where, counted from the start of the file.
+        at: usize,
+        /// What the format says.
+        expected: String,
+        /// What is there.
+        found: String,
+    },
+    /// The file is of a kind that is not read.
+    #[error("{what} {found:?} is not supported; expected {expected}")]
+    Unsupported {
+        /// What is of that kind.
+        what: &'static str,
+        /// The kind.
+        found: String,
+        /// The kinds that are read.
+        expected: &'static str,
+    },
+    /// There are neither triangles nor tetrahedra.
+    #[error("there are no triangles or tetrahedra among {skipped} cells of other types")]
+    NoCells {
+        /// The number of cells of other types.
+        skipped: usize,
+    },
+    /// A mesh of triangles alone that is no plane of constant z.
+    #[error("the triangles have z from {min} to {max}; expected one z, or tetrahedra")]
+    NotFlat {
+        /// The least z.
+        min: f64,
+        /// The greatest z.
+        max: f64,
+    },
+    /// The cells or points are not valid.
+    #[error(transparent)]
+    Mesh(#[from] MeshError),
+}
+
+/// An error at a place in the file.
+pub(super) fn malformed(
+    at: usize,
+    expected: impl Into<String>,
+    found: impl Into<String>,
+) -> MeshReadError {
+    MeshReadError::Malformed { at, expected: expected.into(), found: found.into() }
+}
+
+/// At most 24 bytes of what is at a place, for messages.
+pub(super) fn excerpt(bytes: &[u8], at: usize) -> String {
+    let rest = bytes.get(at..).unwrap_or_default();
+    if rest.is_empty() {
+        return "the end".into();
+    }
+    format!("\"{}\"", rest[..rest.len().min(24)].escape_ascii())
+}
+
+/// A file's points and cells before its dimension is known.
+#[derive(Debug, Default)]
+pub(super) struct Parts {
+    pub points: Vec<[f64; 3]>,
+    pub triangles: Vec<u32>,
+    pub tetrahedra: Vec<u32>,
+    pub skipped_cells: usize,
+    pub fields: Vec<OwnedField>,
+    pub metadata: Metadata,
+}
+
+impl Parts {
+    /// A mesh of the tetrahedra, if there are any, or else of the triangles.
+    pub fn into_mesh(self) -> Result<AnyMesh, MeshReadError> {
+        if !self.tetrahedra.is_empty() {
+            let skipped = self.skipped_cells + self.triangles.len() / 3;
+            let mesh = Mesh::new(self.points, self.tetrahedra)?;
+            return Ok(AnyMesh::Volume(loaded(mesh, self.fields, &self.metadata, skipped)));
+        }
+        if self.triangles.is_empty() {
+            return Err(MeshReadError::NoCells { skipped: self.skipped_cells });
+        }
+        let (mut min, mut max, mut size) = (f64::INFINITY, f64::NEG_INFINITY, 0.0_f64);
+        for p in &self.points {
+            (min, max) = (min.min(p[2]), max.max(p[2]));
+            size = size.max(p[0].abs()).max(p[1].abs());
+        }
+        // what is left of a rotation in double precision, and of text with ten digits
+        if max - min > 1e-9 * size {
+            return Err(MeshReadError::NotFlat { min, max });
+        }
+        let points = self.points.into_iter().map(|[x, y, _]| [x, y]).collect();
+        let mesh = Mesh::new(points, self.triangles)?;
+        Ok(AnyMesh::Flat(loaded(mesh, self.fields, &self.metadata, self.skipped_cells)))
+    }
+}
+
+/// A mesh with what else the file says.
+pub(super) fn loaded<const D: usize>(
+    mesh: Mesh<D>,
+    point_fields: Vec<OwnedField>,
+    metadata: &Metadata,
+    skipped_cells: usize,
+) -> LoadedMesh<D> {
+    let (frame, provenance) = (metadata.frame(), metadata.provenance());
+    LoadedMesh { mesh, point_fields, frame, provenance, skipped_cells }
+}

@@ -1,0 +1,335 @@
+//! Reading VTK's legacy format, binary (always big-endian) and text, versions up to 5.1.
+
+use super::super::column::{Endian, Number};
+use super::super::data::{AnyMesh, OwnedField};
+use super::super::metadata::{self, Metadata};
+use super::super::read::{MeshReadError, Parts, excerpt, malformed};
+
+/// Reads the triangles or tetrahedra of a legacy VTK file.
+///
+/// # Errors
+/// [`MeshReadError`] if the bytes are not such a file. No count in the file makes this allocate more
+/// than a multiple of the file's size.
+pub fn read_vtk(bytes: &[u8]) -> Result<AnyMesh, MeshReadError> {
+    let mut reader =
+        Reader { bytes, at: 0, binary: false, values_at: None, cells: Cells::default() };
+    let mut parts = Parts::default();
+    reader.head()?;
+    while let Some(keyword) = reader.keyword()? {
+        reader.section(keyword, &mut parts)?;
+    }
+    reader.cells.add_to(&mut parts)?;
+    parts.fields.retain(|f| f.values.len() == parts.points.len());
+    parts.into_mesh()
+}
+
+/// What the values of a section belong to.
+#[derive(Clone, Copy, PartialEq)]
+enum Values {
+    Points(usize),
+    Cells(usize),
+}
+
+/// The lists of cells as the file has them: corners, where those of each cell end, and the types.
+#[derive(Default)]
+struct Cells {
+    corners: Vec<f64>,
+    ends: Vec<usize>,
+    kinds: Vec<f64>,
+}
+
+struct Reader<'a> {
+    bytes: &'a [u8],
+    at: usize,
+    binary: bool,
+    values_at: Option<Values>,
+    cells: Cells,
+}
+
+impl<'a> Reader<'a> {
+    fn head(&mut self) -> Result<(), MeshReadError> {
+        if !self.bytes.starts_with(b"# vtk DataFile Version") {
+            return Err(malformed(0, "\"# vtk DataFile Version\"", excerpt(self.bytes, 0)));
+        }
+        self.line()?;
+        self.line()?; // the title
+        self.binary = match self.line()? {
+            "BINARY" => true,
+            "ASCII" => false,
+            other => return Err(malformed(self.at, "BINARY or ASCII before this", other)),
+        };
+        let dataset = self.keyword()?.unwrap_or("");
+        let kind = self.word()?;
+        if (dataset, kind) != ("DATASET", "UNSTRUCTURED_GRID") {
+            let found = format!("{dataset} {kind}");
+            let expected = "DATASET UNSTRUCTURED_GRID";
+            return Err(MeshReadError::Unsupported { what: "VTK data set", found, expected });
+        }
+        Ok(())
+    }
+
+    fn section(&mut self, keyword: &str, parts: &mut Parts) -> Result<(), MeshReadError> {
+        match keyword {
+            "POINTS" => {
+                let count = self.count()?;
+                let kind = self.word()?;
+                let numbers = self.numbers(kind, count, 3)?;
+                parts.points = numbers.as_chunks::<3>().0.to_vec();
+            }
+            "CELLS" => self.cells()?,
+            "CELL_TYPES" => {
+                let count = self.count()?;
+                self.cells.kinds = self.numbers("int", count, 1)?;
+            }
+            "POINT_DATA" => self.values_at = Some(Values::Points(self.count()?)),
+            "CELL_DATA" => self.values_at = Some(Values::Cells(self.count()?)),
+            "FIELD" => self.field(parts)?,
+            "SCALARS" => self.scalars(parts)?,
+            "VECTORS" | "NORMALS" => self.skip_values(3)?,
+            "TENSORS" => self.skip_values(9)?,
+            "LOOKUP_TABLE" => {
+                self.word()?;
+                let count = self.count()?;
+                let kind = if self.binary { "unsigned_char" } else { "float" };
+                self.numbers(kind, count, 4)?;
+            }
+            "METADATA" => self.skip_metadata()?,
+            other => {
+                let found = format!("\"{}\"", other.escape_debug());
+                return Err(malformed(
+                    self.at,
+                    "a section of an unstructured grid before this",
+                    found,
+                ));
+            }
+        }
+        Ok(())
+    }
+
+    /// Cells as lists that begin with their length, or, since 5.0, as offsets and corners.
+    fn cells(&mut self) -> Result<(), MeshReadError> {
+        let (first, second) = (self.count()?, self.count()?);
+        let before = self.at;
+        if self.keyword()? == Some("OFFSETS") {
+            let kind = self.word()?;
+            let offsets = self.numbers(kind, first, 1)?;
+            self.cells.ends = offsets.iter().skip(1).map(|&end| end as usize).collect();
+            if self.keyword()? != Some("CONNECTIVITY") {
+                return Err(malformed(
+                    self.at,
+                    "CONNECTIVITY before this",
+                    excerpt(self.bytes, self.at),
+                ));
+            }
+            let kind = self.word()?;
+            self.cells.corners = self.numbers(kind, second, 1)?;
+            return Ok(());
+        }
+        self.at = before;
+        let list = self.numbers("int", second, 1)?;
+        let mut rest = &list[..];
+        while let [length, tail @ ..] = rest {
+            let Some((cell, next)) = tail.split_at_checked(*length as usize) else {
+                return Err(malformed(before, "cells as long as they say", length.to_string()));
+            };
+            self.cells.corners.extend_from_slice(cell);
+            self.cells.ends.push(self.cells.corners.len());
+            rest = next;
+        }
+        Ok(())
+    }
+
+    fn field(&mut self, parts: &mut Parts) -> Result<(), MeshReadError> {
+        self.word()?;
+        for _ in 0..self.count()? {
+            let name = self.keyword()?.ok_or_else(|| malformed(self.at, "an array", "the end"))?;
+            if name == "METADATA" {
+                self.skip_metadata()?;
+                continue;
+            }
+            let (components, tuples) = (self.count()?, self.count()?);
+            let kind = self.word()?;
+            let values = self.numbers(kind, tuples, components)?;
+            if self.values_at.is_none() && name == metadata::NAME {
+                let text: Vec<u8> = values.iter().map(|&v| v as u8).collect();
+                parts.metadata = Metadata::decode(&text);
+            }
+            self.keep(parts, name, components, values);
+        }
+        Ok(())
+    }
+
+    fn scalars(&mut self, parts: &mut Parts) -> Result<(), MeshReadError> {
+        let name = self.word()?;
+        let kind = self.word()?;
+        let components = match self.line()? {
+            "" => 1,
+            n => n.parse().map_err(|_| malformed(self.at, "components before this", n))?,
+        };
+        let before = self.at;
+        if self.keyword()? == Some("LOOKUP_TABLE") {
+            self.word()?;
+        } else {
+            self.at = before;
+        }
+        let values = self.numbers(kind, self.tuples()?, components)?;
+        self.keep(parts, name, components, values);
+        Ok(())
+    }
+
+    fn skip_values(&mut self, components: usize) -> Result<(), MeshReadError> {
+        self.word()?;
+        let kind = self.word()?;
+        self.numbers(kind, self.tuples()?, components)?;
+        Ok(())
+    }
+
+    fn keep(&self, parts: &mut Parts, name: &str, components: usize, values: Vec<f64>) {
+        if components == 1 && matches!(self.values_at, Some(Values::Points(n)) if n == values.len())
+        {
+            let values = values.into_iter().map(|v| v as f32).collect();
+            parts.fields.push(OwnedField { name: name.into(), values });
+        }
+    }
+
+    fn tuples(&self) -> Result<usize, MeshReadError> {
+        match self.values_at {
+            Some(Values::Points(n) | Values::Cells(n)) => Ok(n),
+            None => Err(malformed(self.at, "POINT_DATA or CELL_DATA before this", "none")),
+        }
+    }
+
+    fn rest(&self) -> &'a [u8] {
+        self.bytes.get(self.at..).unwrap_or_default()
+    }
+
+    /// The rest of the line, without blanks around it.
+    fn line(&mut self) -> Result<&'a str, MeshReadError> {
+        let rest = self.rest();
+        if rest.is_empty() {
+            return Ok("");
+        }
+        let length = rest.iter().position(|&b| b == b'\n').unwrap_or(rest.len());
+        let text = std::str::from_utf8(&rest[..length]);
+        let text =
+            text.map_err(|_| malformed(self.at, "a line of text", excerpt(self.bytes, self.at)))?;
+        self.at += (length + 1).min(rest.len());
+        Ok(text.trim())
+    }
+
+    /// Passes over lines up to an empty one.
+    fn skip_metadata(&mut self) -> Result<(), MeshReadError> {
+        self.line()?; // the keyword's own line
+        while !self.line()?.is_empty() {}
+        Ok(())
+    }
+
+    /// The next word, if there is one.
+    fn keyword(&mut self) -> Result<Option<&'a str>, MeshReadError> {
+        self.at += self.rest().iter().take_while(|b| b.is_ascii_whitespace()).count();
+        let rest = self.rest();
+        let length = rest.iter().take_while(|b| !b.is_ascii_whitespace()).count();
+        let word = std::str::from_utf8(&rest[..length]);
+        let word = word.map_err(|_| malformed(self.at, "a word", excerpt(self.bytes, self.at)))?;
+        self.at += length;
+        Ok((length > 0).then_some(word))
+    }
+
+    fn word(&mut self) -> Result<&'a str, MeshReadError> {
+        self.keyword()?.ok_or_else(|| malformed(self.at, "a word", "the end"))
+    }
+
+    fn count(&mut self) -> Result<usize, MeshReadError> {
+        let word = self.word()?;
+        word.parse().map_err(|_| malformed(self.at, "a count before this", word))
+    }
+
+    /// `tuples` · `components` numbers of VTK's type, as reals: integers are exact below 2^53.
+    fn numbers(
+        &mut self,
+        kind: &str,
+        tuples: usize,
+        components: usize,
+    ) -> Result<Vec<f64>, MeshReadError> {
+        let too_many =
+            |at| malformed(at, "numbers that fit the file", format!("{tuples} × {components}"));
+        let count = tuples.checked_mul(components).ok_or_else(|| too_many(self.at))?;
+        // in text, numbers take a digit and a blank
+        if count > self.rest().len() {
+            return Err(too_many(self.at));
+        }
+        if !self.binary {
+            return (0..count)
+                .map(|_| {
+                    let word = self.word()?;
+                    word.parse().map_err(|_| malformed(self.at, "a number before this", word))
+                })
+                .collect();
+        }
+        self.line()?; // the data begin on the next line
+        match kind {
+            "char" | "signed_char" => self.take::<i8>(count, f64::from),
+            "unsigned_char" => self.take::<u8>(count, f64::from),
+            "short" => self.take::<i16>(count, f64::from),
+            "unsigned_short" => self.take::<u16>(count, f64::from),
+            "int" => self.take::<i32>(count, f64::from),
+            "unsigned_int" => self.take::<u32>(count, f64::from),
+            "long" | "vtktypeint64" | "vtkIdType" => self.take::<i64>(count, |v| v as f64),
+            "unsigned_long" => self.take::<u64>(count, |v| v as f64),
+            "float" => self.take::<f32>(count, f64::from),
+            "double" => self.take::<f64>(count, |v| v),
+            _ => Err(MeshReadError::Unsupported {
+                what: "array type",
+                found: kind.into(),
+                expected: "unsigned_char ... long, float or double",
+            }),
+        }
+    }
+
+    fn take<T: Number>(
+        &mut self,
+        count: usize,
+        real: impl Fn(T) -> f64,
+    ) -> Result<Vec<f64>, MeshReadError> {
+        let bytes = count.checked_mul(T::SIZE).and_then(|size| self.rest().get(..size));
+        let bytes = bytes.ok_or_else(|| {
+            malformed(self.at, format!("{count} numbers of {} bytes", T::SIZE), "the end")
+        })?;
+        self.at += bytes.len();
+        Ok(bytes.chunks_exact(T::SIZE).map(|b| real(T::take(b, Endian::Big))).collect())
+    }
+}
+
+impl Cells {
+    fn add_to(&self, parts: &mut Parts) -> Result<(), MeshReadError> {
+        if self.kinds.len() != self.ends.len() {
+            let expected = format!("types of {} cells", self.ends.len());
+            return Err(malformed(0, expected, self.kinds.len().to_string()));
+        }
+        let mut start = 0;
+        for (cell, (&end, &kind)) in self.ends.iter().zip(&self.kinds).enumerate() {
+            let list = self.corners.get(start..end);
+            let list = list.ok_or_else(|| {
+                malformed(0, format!("growing offsets at cell {cell}"), end.to_string())
+            })?;
+            start = end;
+            let target = match (kind as u8, list.len()) {
+                (5, 3) => &mut parts.triangles,
+                (10, 4) => &mut parts.tetrahedra,
+                _ => {
+                    parts.skipped_cells += 1;
+                    continue;
+                }
+            };
+            for &corner in list {
+                let index = corner as u32;
+                if f64::from(index) != corner {
+                    let expected = format!("an index below 2^32 in cell {cell}");
+                    return Err(malformed(0, expected, corner.to_string()));
+                }
+                target.push(index);
+            }
+        }
+        Ok(())
+    }
+}

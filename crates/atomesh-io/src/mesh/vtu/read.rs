@@ -1,0 +1,267 @@
+//! Reading VTU: text, base64 and raw data, inline and appended, plain and compressed by zlib.
+
+use super::super::column::Endian;
+use super::super::data::{AnyMesh, OwnedField};
+use super::super::metadata::{self, Metadata};
+use super::super::read::{MeshReadError, Parts, excerpt, malformed};
+use super::array::{Array, Layout, Place};
+use super::xml::{Event, Scanner, Tag, find};
+
+/// Reads the triangles or tetrahedra of a VTU file; of several pieces, all.
+///
+/// # Errors
+/// [`MeshReadError`] if the bytes are not such a file. No count in the file makes this allocate more
+/// than the file's own data call for.
+pub fn read_vtu(bytes: &[u8]) -> Result<AnyMesh, MeshReadError> {
+    let document = Document::parse(bytes)?;
+    let mut parts = Parts::default();
+    if let Some(array) = document.field_data.iter().find(|a| a.name == metadata::NAME) {
+        parts.metadata = Metadata::decode(&array.string()?);
+    }
+    for (i, piece) in document.pieces.iter().enumerate() {
+        piece.add_to(&mut parts, i == 0)?;
+    }
+    parts.into_mesh()
+}
+
+/// The arrays of a file, found but not read.
+struct Document<'a> {
+    field_data: Vec<Array<'a>>,
+    pieces: Vec<Piece<'a>>,
+}
+
+#[derive(Default)]
+struct Piece<'a> {
+    at: usize,
+    points: usize,
+    cells: usize,
+    coordinates: Vec<Array<'a>>,
+    topology: Vec<Array<'a>>,
+    point_data: Vec<Array<'a>>,
+}
+
+/// Where the appended data begin, and whether they are base64.
+#[derive(Clone, Copy)]
+struct Appended {
+    start: usize,
+    base64: bool,
+}
+
+impl<'a> Document<'a> {
+    fn parse(bytes: &'a [u8]) -> Result<Self, MeshReadError> {
+        let mut scanner = Scanner::new(bytes);
+        let root = match scanner.next()? {
+            Event::Open(tag) if tag.name == "VTKFile" => tag,
+            _ => return Err(malformed(0, "<VTKFile>", excerpt(bytes, 0))),
+        };
+        let layout = layout(&root)?;
+        let mut document = Self { field_data: vec![], pieces: vec![] };
+        let mut section = "";
+        let mut appended = None;
+        let mut pending = Vec::new();
+        loop {
+            match scanner.next()? {
+                Event::Open(tag) => match tag.name {
+                    "AppendedData" => {
+                        appended = Some(Appended::locate(bytes, scanner.at(), &tag)?);
+                        break; // raw data are no XML
+                    }
+                    "Piece" => document.pieces.push(Piece {
+                        at: tag.at,
+                        points: tag.count("NumberOfPoints")?,
+                        cells: tag.count("NumberOfCells")?,
+                        ..Piece::default()
+                    }),
+                    "FieldData" | "PointData" | "CellData" | "Points" | "Cells" => {
+                        section = tag.name
+                    }
+                    "DataArray" => {
+                        pending.push((section, document.pieces.len(), tag, scanner.at()))
+                    }
+                    _ => {}
+                },
+                Event::Close("VTKFile") | Event::End => break,
+                Event::Close(_) => {}
+            }
+        }
+        for (section, pieces, tag, text) in pending {
+            document.add(section, pieces, || array(bytes, layout, &tag, text, appended))?;
+        }
+        Ok(document)
+    }
+
+    /// Files an array under the section it stands in, of the last of the `pieces` before it.
+    fn add(
+        &mut self,
+        section: &str,
+        pieces: usize,
+        array: impl FnOnce() -> Result<Array<'a>, MeshReadError>,
+    ) -> Result<(), MeshReadError> {
+        let piece = pieces.checked_sub(1).and_then(|i| self.pieces.get_mut(i));
+        match (section, piece) {
+            ("FieldData", _) => self.field_data.push(array()?),
+            ("Points", Some(piece)) => piece.coordinates.push(array()?),
+            ("Cells", Some(piece)) => piece.topology.push(array()?),
+            ("PointData", Some(piece)) => piece.point_data.push(array()?),
+            _ => {}
+        }
+        Ok(())
+    }
+}
+
+fn layout(root: &Tag) -> Result<Layout, MeshReadError> {
+    let unsupported = |what, found: &str, expected| {
+        Err(MeshReadError::Unsupported { what, found: found.into(), expected })
+    };
+    match root.get("type") {
+        Some("UnstructuredGrid") => {}
+        other => return unsupported("VTK file type", other.unwrap_or(""), "UnstructuredGrid"),
+    }
+    let compressed = match root.get("compressor") {
+        None | Some("") => false,
+        Some("vtkZLibDataCompressor") => true,
+        Some(other) => return unsupported("compressor", other, "vtkZLibDataCompressor or none"),
+    };
+    let wide_header = match root.get("header_type") {
+        None | Some("UInt32") => false,
+        Some("UInt64") => true,
+        Some(other) => return unsupported("header type", other, "UInt32 or UInt64"),
+    };
+    let endian = match root.get("byte_order") {
+        None | Some("LittleEndian") => Endian::Little,
+        Some("BigEndian") => Endian::Big,
+        Some(other) => return unsupported("byte order", other, "LittleEndian or BigEndian"),
+    };
+    Ok(Layout { endian, wide_header, compressed })
+}
+
+impl Appended {
+    fn locate(bytes: &[u8], start: usize, tag: &Tag) -> Result<Self, MeshReadError> {
+        let base64 = match tag.get("encoding") {
+            Some("raw") => false,
+            None | Some("base64") => true,
+            Some(other) => {
+                return Err(MeshReadError::Unsupported {
+                    what: "encoding of appended data",
+                    found: other.into(),
+                    expected: "raw or base64",
+                });
+            }
+        };
+        let mark = find(bytes, start, b"_")
+            .filter(|&mark| bytes[start..mark].iter().all(u8::is_ascii_whitespace))
+            .ok_or_else(|| malformed(start, "'_' before appended data", excerpt(bytes, start)))?;
+        Ok(Self { start: mark + 1, base64 })
+    }
+}
+
+fn array<'a>(
+    file: &'a [u8],
+    layout: Layout,
+    tag: &Tag<'a>,
+    text: usize,
+    appended: Option<Appended>,
+) -> Result<Array<'a>, MeshReadError> {
+    let place = match tag.get("format").unwrap_or("ascii") {
+        "ascii" => Place::Text(text),
+        "binary" => Place::Base64(text),
+        "appended" => {
+            let appended = appended
+                .ok_or_else(|| malformed(tag.at, "<AppendedData> for this array", "none"))?;
+            let offset = tag.count("offset")?;
+            let start = appended.start.checked_add(offset).filter(|&s| s <= file.len());
+            let start = start
+                .ok_or_else(|| malformed(tag.at, "an offset in the file", offset.to_string()))?;
+            if appended.base64 { Place::Base64(start) } else { Place::Raw(start) }
+        }
+        other => {
+            return Err(MeshReadError::Unsupported {
+                what: "array format",
+                found: other.into(),
+                expected: "ascii, binary or appended",
+            });
+        }
+    };
+    let components = match tag.get("NumberOfComponents") {
+        None | Some("") => 1,
+        Some(_) => tag.count("NumberOfComponents")?,
+    };
+    let (kind, name) = (tag.require("type")?, tag.get("Name").unwrap_or(""));
+    Ok(Array { file, layout, place, kind, name, components })
+}
+
+impl Piece<'_> {
+    /// Appends the piece's points, cells and scalar fields; fields that not all pieces have are dropped.
+    fn add_to(&self, parts: &mut Parts, first: bool) -> Result<(), MeshReadError> {
+        let base = u32::try_from(parts.points.len()).ok();
+        let base = base.ok_or_else(|| malformed(self.at, "fewer than 2^32 points", "more"))?;
+        let wrong = |expected: &str| malformed(self.at, expected, "a piece without it");
+        let coordinates = self.coordinates.first().ok_or_else(|| wrong("one array in <Points>"))?;
+        if coordinates.components != 3 {
+            let found = coordinates.components.to_string();
+            return Err(malformed(self.at, "points of 3 components", found));
+        }
+        let numbers = coordinates.reals(self.count_of(self.points, 3)?)?;
+        parts.points.extend(numbers.as_chunks::<3>().0);
+        self.add_cells(parts, base)?;
+
+        let mut fields = Vec::new();
+        for array in self.point_data.iter().filter(|a| a.components == 1 && !a.name.is_empty()) {
+            let values = array.reals(self.points)?.into_iter().map(|v| v as f32).collect();
+            fields.push(OwnedField { name: array.name.into(), values });
+        }
+        if first {
+            parts.fields = fields;
+        } else {
+            parts.fields.retain_mut(|old| match fields.iter().find(|new| new.name == old.name) {
+                Some(new) => {
+                    old.values.extend_from_slice(&new.values);
+                    true
+                }
+                None => false,
+            });
+        }
+        Ok(())
+    }
+
+    fn add_cells(&self, parts: &mut Parts, base: u32) -> Result<(), MeshReadError> {
+        let named = |name: &str| {
+            let found = self.topology.iter().find(|a| a.name == name);
+            found.ok_or_else(|| malformed(self.at, format!("{name} in <Cells>"), "none"))
+        };
+        let ends = named("offsets")?.indices(self.cells)?;
+        let kinds = named("types")?.indices(self.cells)?;
+        let corner_count = ends.last().map_or(0, |&end| end as usize);
+        let mut corners = named("connectivity")?.indices(corner_count)?;
+        for corner in &mut corners {
+            let absolute = corner.checked_add(base).filter(|_| (*corner as usize) < self.points);
+            *corner = absolute.ok_or_else(|| {
+                let expected = format!("a point below {}", self.points);
+                malformed(self.at, expected, corner.to_string())
+            })?;
+        }
+        let mut start = 0;
+        for (cell, (&end, &kind)) in ends.iter().zip(&kinds).enumerate() {
+            let list = corners.get(start..end as usize);
+            let list = list.ok_or_else(|| {
+                malformed(self.at, format!("growing offsets at cell {cell}"), end.to_string())
+            })?;
+            start = end as usize;
+            match (kind, list.len()) {
+                (5, 3) => parts.triangles.extend_from_slice(list),
+                (10, 4) => parts.tetrahedra.extend_from_slice(list),
+                (5 | 10, found) => {
+                    let expected = format!("3 or 4 corners of cell {cell}");
+                    return Err(malformed(self.at, expected, found.to_string()));
+                }
+                _ => parts.skipped_cells += 1,
+            }
+        }
+        Ok(())
+    }
+
+    fn count_of(&self, items: usize, each: usize) -> Result<usize, MeshReadError> {
+        let count = items.checked_mul(each);
+        count.ok_or_else(|| malformed(self.at, "a count in memory's reach", items.to_string()))
+    }
+}
