@@ -6,8 +6,8 @@ use rayon::prelude::*;
 /// What a node takes from the samples around it, up to the next nodes.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(super) enum Take {
-    /// Their mean, weighted by how near they are: the weights of linear interpolation.
-    Mean,
+    /// The mean of their magnitudes, weighted by how near they are as linear interpolation does.
+    Magnitude,
     /// The least. Linear interpolation between the nodes is then nowhere above the samples.
     Least,
 }
@@ -86,8 +86,8 @@ fn reduce_axis(
         for (out, footprint) in out.chunks_exact_mut(inner).zip(footprints) {
             let lines = block.chunks_exact(inner).skip(footprint.first).zip(&footprint.weights);
             match take {
-                Take::Mean => lines.for_each(|(line, &w)| {
-                    out.iter_mut().zip(line).for_each(|(o, v)| *o += w * v);
+                Take::Magnitude => lines.for_each(|(line, &w)| {
+                    out.iter_mut().zip(line).for_each(|(o, v)| *o += w * v.abs());
                 }),
                 Take::Least => {
                     out.fill(f32::INFINITY);
@@ -119,7 +119,7 @@ mod tests {
     fn the_same_grid_gives_the_same_values() {
         let grid = Grid { shape: [11, 7, 3], step: [0.1, 0.7, 3.0] };
         let values: Vec<f32> = (0..231).map(|i| (i * 37 % 101) as f32).collect();
-        for take in [Take::Mean, Take::Least] {
+        for take in [Take::Magnitude, Take::Least] {
             assert_eq!(reduce(&values, &grid, &coarse_grid(&grid, 0.05), take), values);
         }
     }
@@ -130,7 +130,7 @@ mod tests {
         let coarse = coarse_grid(&grid, 4.0);
         assert_eq!(coarse.shape, [11, 6]);
         let ramp: Vec<f32> = (0..861).map(|i| (i % 41 + 2 * (i / 41)) as f32).collect();
-        let mean = reduce(&ramp, &grid, &coarse, Take::Mean);
+        let mean = reduce(&ramp, &grid, &coarse, Take::Magnitude);
         for y in 1..5 {
             for x in 1..10 {
                 // footprints are symmetric away from the edges

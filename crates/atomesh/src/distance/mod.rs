@@ -7,6 +7,7 @@
 
 mod coarse;
 mod limit;
+mod tidy;
 
 use crate::geometry::Point;
 use crate::image::{Grid, gaussian};
@@ -14,6 +15,8 @@ use coarse::{Take, coarse_grid, reduce};
 use limit::limit_gradient;
 use rayon::prelude::*;
 use serde::{Deserialize, Serialize};
+
+pub use tidy::default_distance;
 
 /// Greatest slope of d where none is asked for, in lattice units of d per lattice unit of way.
 ///
@@ -174,8 +177,7 @@ impl<const D: usize> NominalDistance<D> {
             return Err(DistanceError::Smooth { value: smooth });
         }
         let nodes = coarse_grid(grid, 0.5 * min);
-        let mut values = reduce(potential, grid, &nodes, Take::Mean);
-        values.iter_mut().for_each(|b| *b = b.abs());
+        let mut values = reduce(potential, grid, &nodes, Take::Magnitude);
         gaussian(&mut values, nodes.shape, nodes.step.map(|step| smooth / step));
         let (sparse, dense) = density_range(&values);
         let scale = if dense > sparse { (max - min) / f64::from(dense - sparse) } else { 0.0 };
@@ -350,37 +352,6 @@ fn greatest_slope<const D: usize>(values: &[f32], nodes: &Grid<D>) -> f64 {
     };
     let rows: usize = cells[1..].iter().product();
     (0..rows).into_par_iter().map(squared_of_row).reduce(|| 0.0, f64::max).sqrt()
-}
-
-/// A tidy constant distance for an image of which nothing else is known, in lattice units.
-///
-/// About 1,500 hexagonal atoms in the plane, 50,000 BCC atoms in space, give or take a half; the
-/// digits are 1, 1.2, 1.5, 2, 2.5, 3, 4, 5, 6 or 8. At least twice the least step, also where
-/// that gives fewer atoms. For Hale's 256 × 256 samples it is his 8.
-///
-/// ```
-/// let grid = atomesh::image::Grid { shape: [256, 256], step: [1.0, 1.0] };
-/// assert_eq!(atomesh::distance::default_distance(&grid), 8.0);
-/// ```
-pub fn default_distance<const D: usize>(grid: &Grid<D>) -> f64 {
-    let per_atom = if D <= 2 { 2.0 / 3f64.sqrt() / 1_500.0 } else { 0.75 * 3f64.sqrt() / 50_000.0 };
-    // logarithms, lest the product overflows; an axis of one sample is a step thick
-    let extent = grid.bounds().extent();
-    let log_measure: f64 = (0..D).map(|k| extent[k].max(grid.step[k]).ln()).sum();
-    let distance = ((log_measure + f64::ln(per_atom)) / D as f64).exp();
-    tidy(distance).max(2.0 * grid.least_step())
-}
-
-/// The nearest number of few digits, by ratio.
-fn tidy(value: f64) -> f64 {
-    const DIGITS: [f64; 11] = [1.0, 1.2, 1.5, 2.0, 2.5, 3.0, 4.0, 5.0, 6.0, 8.0, 10.0];
-    let exponent = value.log10().floor() as i32;
-    // powers of ten below 1 are not exact: divide by those above
-    let power = 10f64.powi(exponent.abs());
-    let scaled = |digit: f64| if exponent < 0 { digit / power } else { digit * power };
-    let unlike = |digit: f64| (scaled(digit) / value).ln().abs();
-    let nearest = DIGITS.into_iter().min_by(|&a, &b| unlike(a).total_cmp(&unlike(b)));
-    scaled(nearest.unwrap_or(1.0))
 }
 
 /// The weight of node `i` of `n` in the trapezoidal rule.

@@ -157,13 +157,6 @@ fn the_default_is_tidy_and_gives_the_promised_number_of_atoms() {
 }
 
 #[test]
-fn tidy_numbers_have_few_digits() {
-    for (value, expected) in [(7.07, 8.0), (0.0013, 0.0012), (95.0, 100.0), (1.0, 1.0)] {
-        assert_eq!(tidy(value), expected);
-    }
-}
-
-#[test]
 fn a_box_of_one_sample_has_a_distance() {
     let grid = Grid { shape: [1, 1, 1], step: [1.0; 3] };
     let d = NominalDistance::from_field(&grid, &[3.0], 0.25).unwrap();
@@ -194,4 +187,18 @@ fn no_two_points_differ_by_more_than_the_greatest_slope() {
     assert!(bound < 0.4 * 3f64.sqrt() + 1e-3, "{bound}");
     let flat = NominalDistance::constant(&grid, 3.0).unwrap();
     assert_eq!(flat.greatest_slope(), 0.0);
+}
+
+#[test]
+fn bits_do_not_depend_on_the_number_of_threads() {
+    let grid = Grid { shape: [60, 50, 40], step: [1.0, 1.0, 2.0] };
+    let mut random = rand_pcg::Pcg64Mcg::seed_from_u64(9);
+    let potential: Vec<f32> =
+        (0..grid.sample_count()).map(|_| -random.random::<f32>().powi(8)).collect();
+    let run = |threads| {
+        let pool = rayon::ThreadPoolBuilder::new().num_threads(threads).build().unwrap();
+        let grading = Grading { smooth: Some(3.0), ..Grading::new(4.0, 40.0) };
+        pool.install(|| NominalDistance::from_potential(&grid, &potential, &grading).unwrap())
+    };
+    assert_eq!(run(1), run(3));
 }

@@ -28,6 +28,9 @@ use serde::{Deserialize, Serialize};
 /// Of all samples, the share whose gradient is clipped to −1.
 const CLIPPED_EDGES: f64 = 0.005;
 
+/// The narrowest Gaussian, in samples, whose derivative still sees the neighbours.
+const LEAST_EDGE_SCALE: f64 = 0.3;
+
 /// Samples that one task maps.
 const BLOCK: usize = 1 << 16;
 
@@ -68,8 +71,8 @@ pub struct FeatureOptions {
     /// How edges are found; the other features ignore it. Default: Gaussian, since one sample's
     /// noise already makes a Prewitt edge.
     pub edge_operator: EdgeOperator,
-    /// Standard deviation of the Gaussian operator in samples along every axis, above 0; Prewitt's
-    /// ignores it. Default 1.5: wide enough to fill the gaps between samples of a slanted edge,
+    /// Standard deviation of the Gaussian operator in samples along every axis, 0.3 or more: less
+    /// would hardly reach the neighbours. Prewitt's ignores it. Default 1.5: wide enough to fill the gaps between samples of a slanted edge,
     /// narrow enough to keep the two sides of a sheet of 4 samples apart.
     pub edge_scale: f64,
     /// Standard deviation, in lattice units, of a Gaussian over the finished potential; b is not
@@ -120,8 +123,8 @@ pub enum EnhanceError {
         /// The sample.
         value: f32,
     },
-    /// The standard deviation of the edge operator is not a finite number above 0.
-    #[error("edge scale {value}; expected a finite number of samples above 0")]
+    /// The standard deviation of the edge operator is not a finite number from 0.3.
+    #[error("edge scale {value}; expected a finite number of samples, {LEAST_EDGE_SCALE} or more")]
     EdgeScale {
         /// The scale found.
         value: f64,
@@ -212,7 +215,7 @@ pub fn given_potential(samples: Samples) -> Result<Vec<f32>, EnhanceError> {
 
 fn check_options(options: &FeatureOptions) -> Result<(), EnhanceError> {
     let (scale, smooth) = (options.edge_scale, options.smooth);
-    if !(scale.is_finite() && scale > 0.0) {
+    if !(scale.is_finite() && scale >= LEAST_EDGE_SCALE) {
         return Err(EnhanceError::EdgeScale { value: scale });
     }
     if !(smooth.is_finite() && smooth >= 0.0) {

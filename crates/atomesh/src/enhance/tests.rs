@@ -157,7 +157,7 @@ fn samples_that_are_not_finite_are_counted_and_named() {
 #[test]
 fn bad_options_are_refused() {
     let image = image([10, 3], Samples::U8(vec![0; 30]));
-    for value in [0.0, -1.0, f64::NAN, f64::INFINITY] {
+    for value in [0.0, 0.29, -1.0, f64::NAN, f64::INFINITY] {
         let options = FeatureOptions { edge_scale: value, ..Default::default() };
         let error = enhance(&image, &options, &mut Silent).unwrap_err();
         assert!(matches!(error, EnhanceError::EdgeScale { .. }));

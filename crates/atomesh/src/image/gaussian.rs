@@ -63,7 +63,7 @@ fn kernels<const D: usize>(
 /// The kernel of a derivative for an axis of `n` samples.
 pub(super) fn kernel(sigma: f64, order: u8, n: usize) -> Kernel {
     // mirrored samples repeat: far beyond the axis a wider Gaussian is as flat to rounding
-    let sigma = sigma.min(64.0 * n as f64);
+    let sigma = sigma.min(16.0 * n as f64);
     let radius = (TRUNCATE * sigma + 0.5) as usize;
     let variance = sigma * sigma;
     let mut half: Vec<f64> =

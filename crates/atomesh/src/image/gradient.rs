@@ -2,9 +2,9 @@
 //!
 //! Both operators are separable: along one axis a slope, along the others an average. The image is
 //! streamed along its last axis: per plane that comes in, each component is weighted within the
-//! plane and kept in a ring as deep as the kernel, from which the plane that has become complete
-//! is weighted along the last axis. So the memory beside image and result is D · (2r + 1) planes a
-//! thread, and the image may stay in the type of its file.
+//! plane and kept in a ring, from which the planes that have become complete are weighted along the
+//! last axis. So the memory beside image and result is 3 r D planes a thread, of a kernel that
+//! reaches r samples, and the image may stay in the type of its file.
 
 use super::convolve::{Kernel, convolve_slab, mirrored};
 use super::gaussian::kernel;
@@ -13,8 +13,9 @@ use crate::watch::Cancelled;
 use rayon::prelude::*;
 use std::cmp::Ordering;
 
-/// Samples weighted at once along the last axis: 8 KiB, so that a sum stays in the nearest cache.
-const CHUNK: usize = 2048;
+/// Columns weighted at once along the last axis: 2 KiB a plane, so that the planes of a ring stay in
+/// the second-level cache meanwhile.
+const CHUNK: usize = 512;
 
 /// Samples between two looks at whether to go on: a fraction of a second's work.
 const BATCH_SAMPLES: usize = 1 << 25;
@@ -56,7 +57,9 @@ pub fn prewitt_magnitude<const D: usize>(samples: &Samples, grid: &Grid<D>) -> V
 /// The magnitude of the gradient of the smoothed image, in sample values per lattice unit.
 ///
 /// Derivatives of a Gaussian of standard deviation `sigma`, in samples along every axis, as of
-/// [`gaussian_derivative`](super::gaussian_derivative), each over its axis' step.
+/// [`gaussian_derivative`](super::gaussian_derivative), each over its axis' step. Below 0.5 or so a
+/// Gaussian is narrower than the samples are apart, and slopes come out too small; below 1/8 it
+/// reaches no neighbour, and they are 0.
 ///
 /// # Panics
 /// If there are not as many samples as the grid's shape says, or σ is not finite and above 0.
@@ -92,6 +95,9 @@ pub(crate) fn magnitude<const D: usize>(
     stencil: Stencil,
     go_on: &mut dyn FnMut(f64) -> Result<(), Cancelled>,
 ) -> Result<Vec<f32>, Cancelled> {
+    if grid.sample_count() == 0 {
+        return Ok(Vec::new());
+    }
     let stream = Stream::new(fill, grid, stencil);
     let planes = grid.shape[D - 1];
     // each task starts by filling its ring, so that it should be long beside the kernel
@@ -147,21 +153,35 @@ impl<F: Fn(usize, &mut [f32]) + Sync, const D: usize> Stream<F, D> {
         Self { fill, shape: grid.shape, plane, kernels, shared, radius }
     }
 
+    /// Planes weighted along the last axis at once, so that the ring is read from memory few times.
+    fn group(&self) -> usize {
+        self.radius.max(1)
+    }
+
+    /// Planes held at a time.
+    fn depth(&self) -> usize {
+        2 * self.radius + self.group()
+    }
+
     /// Writes the planes from `first` on, as many as fit in `out`.
     fn run(&self, first: usize, out: &mut [f32]) {
-        let depth = 2 * self.radius + 1;
+        let depth = self.depth();
         let mut ring: [Vec<f32>; D] = std::array::from_fn(|_| vec![0.0; depth * self.plane]);
         let mut scratch = Vec::new();
-        let count = out.len() / self.plane;
-        for arrived in 0..count + depth - 1 {
-            let place = (first + arrived) as isize - self.radius as isize;
-            let source = mirrored(place, self.shape[D - 1]);
-            let slots =
-                ring.each_mut().map(|r| &mut r[arrived % depth * self.plane..][..self.plane]);
-            self.weigh_within(source * self.plane, slots, &mut scratch);
-            if let Some(complete) = (arrived + 1).checked_sub(depth) {
-                let out = &mut out[complete * self.plane..][..self.plane];
-                self.combine(&ring, complete % depth, out);
+        let mut arrived = 0;
+        for (g, out) in out.chunks_mut(self.group() * self.plane).enumerate() {
+            let start = g * self.group();
+            let needed = start + out.len() / self.plane + 2 * self.radius;
+            for arrival in arrived..needed {
+                let place = (first + arrival) as isize - self.radius as isize;
+                let source = mirrored(place, self.shape[D - 1]);
+                let at = arrival % depth * self.plane;
+                let slots = ring.each_mut().map(|r| &mut r[at..at + self.plane]);
+                self.weigh_within(source * self.plane, slots, &mut scratch);
+            }
+            arrived = needed;
+            for column in (0..self.plane).step_by(CHUNK) {
+                self.combine(&ring, start, column, out);
             }
         }
     }
@@ -178,27 +198,30 @@ impl<F: Fn(usize, &mut [f32]) + Sync, const D: usize> Stream<F, D> {
         }
     }
 
-    /// Weighs the ring, whose oldest plane is in slot `oldest`, along the last axis.
-    fn combine(&self, ring: &[Vec<f32>; D], oldest: usize, out: &mut [f32]) {
-        let depth = 2 * self.radius + 1;
+    /// Weighs a chunk of columns along the last axis, for all planes of `out`.
+    ///
+    /// The arrival `start` is the first that the first of these planes needs.
+    fn combine(&self, ring: &[Vec<f32>; D], start: usize, column: usize, out: &mut [f32]) {
+        let width = CHUNK.min(self.plane - column);
         let mut slope = [0.0; CHUNK];
-        for (c, out) in out.chunks_mut(CHUNK).enumerate() {
-            let slope = &mut slope[..out.len()];
-            for (ring, kernels) in ring.iter().zip(&self.kernels) {
-                let Some(kernel) = &kernels[D - 1] else { continue };
-                let nearer = self.radius - kernel.radius();
-                let rows: Vec<&[f32]> = (nearer..depth - nearer)
-                    .map(|t| {
-                        let slot = (oldest + t) % depth;
-                        &ring[slot * self.plane + c * CHUNK..][..slope.len()]
-                    })
-                    .collect();
-                kernel.weigh_rows(&rows, slope);
-                for (sum, s) in out.iter_mut().zip(slope.iter()) {
+        let slope = &mut slope[..width];
+        for (ring, kernels) in ring.iter().zip(&self.kernels) {
+            let Some(kernel) = &kernels[D - 1] else { continue };
+            let nearer = self.radius - kernel.radius();
+            let planes = out.len() / self.plane;
+            let rows: Vec<&[f32]> = (start + nearer..start + planes + 2 * self.radius - nearer)
+                .map(|arrival| &ring[arrival % self.depth() * self.plane + column..][..width])
+                .collect();
+            let windows = rows.windows(2 * kernel.radius() + 1);
+            for (out, rows) in out.chunks_exact_mut(self.plane).zip(windows) {
+                kernel.weigh_rows(rows, slope);
+                for (sum, s) in out[column..column + width].iter_mut().zip(slope.iter()) {
                     *sum += s * s;
                 }
             }
-            for sum in out {
+        }
+        for out in out.chunks_exact_mut(self.plane) {
+            for sum in &mut out[column..column + width] {
                 *sum = sum.sqrt();
             }
         }

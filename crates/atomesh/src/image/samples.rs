@@ -129,11 +129,13 @@ impl Samples {
     ///
     /// # Panics
     /// If there is no such sample.
+    #[allow(clippy::useless_conversion)] // of f64, one of the types
     pub fn get(&self, index: usize) -> f64 {
         each!(self, v => v[index].into())
     }
 
     /// A copy in single precision.
+    #[allow(clippy::useless_conversion)] // of f64, one of the types
     pub fn to_f32(&self) -> Vec<f32> {
         match self {
             Samples::F32(v) => v.clone(),
@@ -153,6 +155,7 @@ impl Samples {
     ///
     /// # Panics
     /// If there are not as many samples.
+    #[allow(clippy::useless_conversion)] // of f64, one of the types
     pub fn map_into(&self, start: usize, out: &mut [f32], map: impl Fn(f64) -> f32) {
         let end = start + out.len();
         each!(self, v => for (o, &s) in out.iter_mut().zip(&v[start..end]) {
