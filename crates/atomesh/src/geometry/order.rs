@@ -122,7 +122,7 @@ fn entry(w: usize) -> usize {
 fn direction(w: usize) -> usize {
     match w {
         0 => 0,
-        _ if w % 2 == 0 => (w - 1).trailing_ones() as usize,
+        _ if w.is_multiple_of(2) => (w - 1).trailing_ones() as usize,
         _ => w.trailing_ones() as usize,
     }
 }

@@ -146,18 +146,19 @@ fn scattered_and_jittered_points_connect_soundly() {
     }
 }
 
+fn on_the_unit_sphere(count: usize, seed: u64) -> Vec<Point<3>> {
+    let normalized = |p: &Point<3>| {
+        let v = p.map(|x| x - 0.5);
+        let length = crate::geometry::dot(&v, &v).sqrt();
+        v.map(|x| x / length)
+    };
+    scatter::<3>(count, seed).iter().map(normalized).collect()
+}
+
 #[test]
 fn points_on_spheres_and_cubes_connect_soundly() {
-    let directions: Vec<Point<3>> = scatter::<3>(600, 4)
-        .iter()
-        .map(|p| {
-            let v = p.map(|x| x - 0.5);
-            let length = crate::geometry::dot(&v, &v).sqrt();
-            v.map(|x| x / length)
-        })
-        .collect();
+    let directions = on_the_unit_sphere(600, 4);
     connect_soundly(Delaunay::<3>::new(), &directions, None);
-    // A point in the middle: its cavity is the whole ball, with a rim of hundreds of vertices.
     let with_centre: Vec<_> = directions.iter().copied().chain([[0.01, 0.02, 0.0]]).collect();
     connect_soundly(Delaunay::<3>::new(), &with_centre, None);
     let surface: Vec<Point<3>> =
@@ -166,6 +167,43 @@ fn points_on_spheres_and_cubes_connect_soundly() {
     let inside = scatter::<3>(300, 5).into_iter().map(|p| p.map(|x| 0.5 + 5.0 * x));
     let both: Vec<_> = surface.into_iter().chain(inside).collect();
     connect_soundly(Delaunay::<3>::new(), &both, Some(216.0));
+}
+
+#[test]
+fn a_rim_of_hundreds_of_vertices_closes() {
+    // Even points on a ball first, its centre last: every cell is in its cavity.
+    let mut points = on_the_unit_sphere(600, 9);
+    points.push([0.01, 0.02, 0.0]);
+    let order = (0..points.len() as u32).collect();
+    let cells = space::connect_in_order(&points, order, &mut Silent).unwrap().unwrap();
+    let mesh = Mesh::new(points, cells).unwrap();
+    mesh.validate().unwrap();
+    mesh.check_delaunay().unwrap();
+    // By Euler's formula a surface of n vertices has 2n − 4 triangles, each a cell with the centre.
+    assert_eq!(mesh.cell_count(), 2 * 600 - 4);
+}
+
+#[test]
+fn extreme_powers_of_two_change_no_cell() {
+    let points = face_centered(2);
+    let expected = Delaunay::<3>::new().connect(&points, &mut Silent).unwrap();
+    for exponent in [1020, 300, -300, -1000, -1072] {
+        let factor = 2.0_f64.powi(exponent / 2);
+        let scaled: Vec<Point<3>> = points.iter().map(|p| p.map(|x| x * factor * factor)).collect();
+        let mesh = Delaunay::<3>::new().connect(&scaled, &mut Silent).unwrap();
+        assert_eq!(mesh.corners(), expected.corners(), "2^{exponent}");
+    }
+}
+
+#[test]
+fn long_thin_and_graded_clouds_connect_soundly() {
+    let cloud = scatter::<3>(1500, 10);
+    let long: Vec<Point<3>> = cloud.iter().map(|p| [1e4 * p[0], p[1], 1e-3 * p[2]]).collect();
+    connect_soundly(Delaunay::<3>::new(), &long, None);
+    let graded: Vec<Point<3>> = cloud.iter().map(|p| p.map(|x| x.powi(8))).collect();
+    connect_soundly(Delaunay::<3>::new(), &graded, None);
+    let far: Vec<Point<3>> = face_centered(3).iter().map(|p| p.map(|x| x + 1e6)).collect();
+    connect_soundly(Delaunay::<3>::new(), &far, Some(27.0));
 }
 
 #[test]

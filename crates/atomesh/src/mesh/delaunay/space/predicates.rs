@@ -1,7 +1,9 @@
 //! Signs of determinants: filtered, exact, and perturbed where exactly zero.
 //!
-//! The filter is static: one bound on the rounding error for the whole box of points, from the error
-//! analysis of Shewchuk (1997), whose order of operations is kept.
+//! Two filters come first, both from the error analysis of Shewchuk (1997), whose order of operations
+//! is kept: one bound on the rounding error for the whole box of points, then one for the box of the
+//! points at hand. What passes neither is decided in fixed point or, where that is too coarse, by
+//! adaptive arithmetic.
 
 use super::fixed;
 use crate::geometry::{Point, lexicographic};
@@ -10,7 +12,7 @@ use robust::{Coord3D, insphere, orient3d};
 /// Half a unit in the last place of 1.
 const ROUNDING: f64 = f64::EPSILON / 2.0;
 
-/// The error bounds for points in one box.
+/// The error bounds for points in one box, or no further apart than its sides.
 pub(super) struct Predicates {
     orientation_bound: f64,
     in_sphere_bound: f64,
@@ -32,10 +34,7 @@ impl Predicates {
     /// Has the sign of the volume of a, b, c, d.
     #[inline]
     pub fn orientation(&self, [a, b, c, d]: [&Point<3>; 4]) -> f64 {
-        let (x, y, z) = (minus(a, d), minus(b, d), minus(c, d));
-        let rounded = x[2] * (z[0] * y[1] - y[0] * z[1])
-            + y[2] * (x[0] * z[1] - z[0] * x[1])
-            + z[2] * (y[0] * x[1] - x[0] * y[1]);
+        let rounded = rounded_orientation([a, b, c, d]);
         if rounded.abs() > self.orientation_bound {
             return rounded;
         }
@@ -56,6 +55,14 @@ fn minus(a: &Point<3>, b: &Point<3>) -> Point<3> {
 }
 
 #[inline(always)]
+fn rounded_orientation([a, b, c, d]: [&Point<3>; 4]) -> f64 {
+    let (a, b, c) = (minus(a, d), minus(b, d), minus(c, d));
+    a[2] * (c[0] * b[1] - b[0] * c[1])
+        + b[2] * (a[0] * c[1] - c[0] * a[1])
+        + c[2] * (b[0] * a[1] - a[0] * b[1])
+}
+
+#[inline(always)]
 fn rounded_in_sphere(cell: [&Point<3>; 4], p: &Point<3>) -> f64 {
     let [a, b, c, d] = cell.map(|corner| minus(corner, p));
     let minor = |u: &Point<3>, v: &Point<3>| u[0] * v[1] - v[0] * u[1];
@@ -70,13 +77,28 @@ fn rounded_in_sphere(cell: [&Point<3>; 4], p: &Point<3>) -> f64 {
     (lift(&c) * dab - lift(&d) * abc) + (lift(&a) * bcd - lift(&b) * cda)
 }
 
+/// How far the points are from the last, along each axis.
+fn reach<const N: usize>(points: [&Point<3>; N], last: &Point<3>) -> Point<3> {
+    let mut reach = [0.0_f64; 3];
+    for point in points {
+        let v = minus(point, last);
+        reach = std::array::from_fn(|k| reach[k].max(v[k].abs()));
+    }
+    reach
+}
+
 fn coordinates(p: &Point<3>) -> Coord3D<f64> {
     Coord3D { x: p[0], y: p[1], z: p[2] }
 }
 
-/// Has the sign of the volume of a, b, c, d, without a filter.
+/// Has the sign of the volume of a, b, c, d.
 #[cold]
 pub(super) fn exact_orientation(corners: [&Point<3>; 4]) -> f64 {
+    let [a, b, c, d] = corners;
+    let rounded = rounded_orientation(corners);
+    if rounded.abs() > Predicates::new(reach([a, b, c], d)).orientation_bound {
+        return rounded;
+    }
     if let Some(sign) = fixed::orientation(corners) {
         return f64::from(sign as i8);
     }
@@ -86,6 +108,10 @@ pub(super) fn exact_orientation(corners: [&Point<3>; 4]) -> f64 {
 
 #[cold]
 fn exact_in_sphere(cell: [&Point<3>; 4], p: &Point<3>) -> bool {
+    let rounded = rounded_in_sphere(cell, p);
+    if rounded.abs() > Predicates::new(reach(cell, p)).in_sphere_bound {
+        return rounded > 0.0;
+    }
     let sign = fixed::in_sphere(cell, p).unwrap_or_else(|| {
         let [a, b, c, d] = cell.map(coordinates);
         0.0_f64.total_cmp(&(insphere(a, b, c, d, coordinates(p)) + 0.0))
