@@ -87,7 +87,8 @@ fn add_product(sum: &mut Wide, a: Wide, b: Wide) {
 }
 
 fn sign(wide: Wide) -> Ordering {
-    if wide == [0; 5] { Ordering::Equal } else { (wide[4] as i64).cmp(&0).then(Ordering::Greater) }
+    let any = wide.iter().fold(0, |any, digit| any | digit);
+    if any == 0 { Ordering::Equal } else { (wide[4] as i64).cmp(&0).then(Ordering::Greater) }
 }
 
 #[cfg(test)]
