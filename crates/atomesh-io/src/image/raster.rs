@@ -4,13 +4,14 @@
 //! stretched to the whole range of 8 or 16 bits. The orientation that a camera notes in a JPEG is
 //! not followed: row 0 is the first one stored.
 
-use std::io::{BufReader, Read, Seek, Write};
+use std::io::{BufReader, Read, Seek, SeekFrom, Write};
 
 use ::image::codecs::png::PngEncoder;
 use ::image::error::LimitErrorKind;
 use ::image::{DynamicImage, ImageBuffer, ImageDecoder, ImageError, ImageReader, Limits, Luma};
 use atomesh::image::{Image, Samples};
 
+use super::stream;
 use super::{AnyImage, ImageFormat, ReadReason, WriteReason};
 
 /// Decodes a flat image, colour to luminance in place.
@@ -29,7 +30,11 @@ pub(super) fn read<R: Read + Seek>(
     };
     let mut limits = Limits::no_limits();
     limits.max_alloc = Some(file_bytes.saturating_mul(8 * density) + (64 << 20));
-    let mut reader = ImageReader::with_format(BufReader::new(source), codec);
+    let mut source = BufReader::new(source);
+    if format == ImageFormat::Png {
+        refuse_broken_palettes(&mut source)?;
+    }
+    let mut reader = ImageReader::with_format(source, codec);
     reader.limits(limits);
     let decoder = reader.into_decoder().map_err(|e| reason(format, e))?;
     let (width, height) = decoder.dimensions();
@@ -54,6 +59,33 @@ pub(super) fn read<R: Read + Seek>(
         }
     };
     AnyImage::frameless(&shape, samples)
+}
+
+/// Looks at the chunks before the samples for a palette that is not made of whole colours, three
+/// bytes each, for the decoder (`png` 0.18.1) panics on one; then goes back to the start.
+fn refuse_broken_palettes<R: Read + Seek>(source: &mut BufReader<R>) -> Result<(), ReadReason> {
+    let mut at = 8; // behind the signature
+    loop {
+        source.seek(SeekFrom::Start(at)).map_err(ReadReason::Io)?;
+        let mut head = [0; 8];
+        let filled = stream::fill(source, &mut head)?;
+        let [a, b, c, d, kind @ ..] = head;
+        let length = u32::from_be_bytes([a, b, c, d]);
+        match &kind {
+            _ if filled < head.len() => break, // the decoder says what is missing
+            b"IDAT" | b"IEND" => break,
+            b"PLTE" if !length.is_multiple_of(3) => {
+                return Err(ReadReason::Header {
+                    format: ImageFormat::Png,
+                    field: "PLTE length",
+                    value: length.to_string(),
+                    expected: "a multiple of 3",
+                });
+            }
+            _ => at += 12 + u64::from(length), // length, kind, check sum
+        }
+    }
+    source.rewind().map_err(ReadReason::Io)
 }
 
 /// The reason that a codec's error stands for.
@@ -233,6 +265,36 @@ mod tests {
         let pnm = b"P5 4 4 255\n0123456789abcdef";
         for length in 1..pnm.len() {
             assert!(decode(&pnm[..length], ImageFormat::Pnm).is_err(), "{length}");
+        }
+    }
+
+    /// A PNG of one 8-bit index, 0, into a palette of these bytes.
+    fn indexed(palette: &[u8]) -> Vec<u8> {
+        let mut samples = flate2::write::ZlibEncoder::new(Vec::new(), Default::default());
+        samples.write_all(&[0, 0]).unwrap(); // no filter, index 0
+        let samples = samples.finish().unwrap();
+        let mut png = b"\x89PNG\r\n\x1a\n".to_vec();
+        let size = [0, 0, 0, 1, 0, 0, 0, 1, 8, 3, 0, 0, 0];
+        let chunks =
+            [(b"IHDR", &size[..]), (b"PLTE", palette), (b"IDAT", &samples), (b"IEND", &[])];
+        for (kind, content) in chunks {
+            let body = [&kind[..], content].concat();
+            let mut sum = flate2::Crc::new();
+            sum.update(&body);
+            png.extend((content.len() as u32).to_be_bytes());
+            png.extend(body);
+            png.extend(sum.sum().to_be_bytes());
+        }
+        png
+    }
+
+    #[test]
+    fn palettes_are_followed_and_broken_ones_refused() {
+        let image = decode(&indexed(&[255, 0, 0, 9, 9, 9]), ImageFormat::Png).unwrap();
+        assert_eq!(*image.samples(), Samples::U8(vec![76]));
+        for length in [1, 2, 4, 5, 7] {
+            let error = decode(&indexed(&vec![1; length]), ImageFormat::Png).unwrap_err();
+            assert!(error.to_string().contains("multiple of 3"), "{error}");
         }
     }
 
