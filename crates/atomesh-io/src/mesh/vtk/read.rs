@@ -142,10 +142,10 @@ impl<'a> Reader<'a> {
     fn field(&mut self, parts: &mut Parts) -> Result<(), MeshReadError> {
         self.word()?;
         for _ in 0..self.count()? {
-            let name = self.keyword()?.ok_or_else(|| malformed(self.at, "an array", "the end"))?;
-            if name == "METADATA" {
-                self.skip_metadata()?;
-                continue;
+            let mut name = self.word()?;
+            while name == "METADATA" {
+                self.skip_metadata()?; // of the array before
+                name = self.word()?;
             }
             let (components, tuples) = (self.count()?, self.count()?);
             let kind = self.word()?;

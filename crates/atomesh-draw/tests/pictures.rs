@@ -1,0 +1,267 @@
+//! Pictures, decoded and looked at sample by sample.
+
+use std::path::Path;
+
+use atomesh::image::{Frame, Image, Samples, Units};
+use atomesh::mesh::Mesh;
+use atomesh_draw::{DrawError, Picture, PictureFormat, Style, draw_flat, draw_slices};
+use proptest::prelude::*;
+
+/// The pixels of a PNG, row by row.
+struct Pixels {
+    width: usize,
+    height: usize,
+    rgb: Vec<[u8; 3]>,
+}
+
+impl Pixels {
+    fn of(picture: &Picture) -> Self {
+        let bytes = picture.encode(PictureFormat::Png).unwrap();
+        let mut reader = png::Decoder::new(std::io::Cursor::new(bytes)).read_info().unwrap();
+        let mut rgb = vec![0; reader.output_buffer_size().unwrap()];
+        let info = reader.next_frame(&mut rgb).unwrap();
+        assert_eq!((info.width, info.height), (picture.width(), picture.height()));
+        let rgb = rgb.as_chunks().0.to_vec();
+        Self { width: info.width as usize, height: info.height as usize, rgb }
+    }
+
+    fn at(&self, x: f64, y: f64) -> [u8; 3] {
+        self.rgb[y as usize * self.width + x as usize]
+    }
+}
+
+/// An image whose sample at x, y is x + 10 y.
+fn slope(nx: usize, ny: usize) -> Image<2> {
+    let samples = (0..nx * ny).map(|i| (i % nx + 10 * (i / nx)) as u8).collect();
+    Image::new(Frame::new([nx, ny]).unwrap(), Samples::U8(samples)).unwrap()
+}
+
+/// Two triangles over the whole image.
+fn square(nx: usize, ny: usize) -> Mesh<2> {
+    let (x, y) = ((nx - 1) as f64, (ny - 1) as f64);
+    Mesh::new(vec![[0.0, 0.0], [x, 0.0], [x, y], [0.0, y]], vec![0, 1, 2, 0, 2, 3]).unwrap()
+}
+
+fn empty<const D: usize>() -> Mesh<D> {
+    Mesh::new(vec![], vec![]).unwrap()
+}
+
+#[test]
+fn samples_are_squares_with_row_zero_on_top() {
+    let style = Style { max_side: 80.0, brightness: 1.0, ..Style::default() };
+    let pixels = Pixels::of(&draw_flat(&slope(8, 4), &empty(), &style).unwrap());
+    assert_eq!((pixels.width, pixels.height), (80, 40));
+    for j in 0..4 {
+        for i in 0..8 {
+            let value = (i + 10 * j) as f64; // the 32 samples are too few for percentiles: 0 ... 37
+            let grey = (value / 37.0 * 255.0).round() as u8;
+            let (x, y) = (10.0 * i as f64, 10.0 * j as f64);
+            for (dx, dy) in [(0.5, 0.5), (9.5, 0.5), (5.0, 9.5)] {
+                assert_eq!(pixels.at(x + dx, y + dy), [grey; 3], "sample {i}, {j}");
+            }
+        }
+    }
+}
+
+#[test]
+fn edges_run_between_the_centres_of_samples() {
+    let style = Style { max_side: 90.0, edge_pixels: 1000.0, edge_width: 3.0, ..Style::default() };
+    let pixels = Pixels::of(&draw_flat(&slope(9, 9), &square(9, 9), &style).unwrap());
+    // ten pixels to a sample: the corners are at 5 and 85
+    for (x, y) in [(5.0, 5.0), (85.0, 5.0), (45.0, 5.0), (5.0, 45.0), (45.0, 45.0), (45.0, 85.0)] {
+        assert!(pixels.at(x, y)[0] > 200, "no edge at {x}, {y}: {:?}", pixels.at(x, y));
+    }
+    for (x, y) in [(2.0, 2.0), (88.0, 45.0), (60.0, 30.0), (30.0, 60.0)] {
+        let [r, g, b] = pixels.at(x, y);
+        assert!(r == g && g == b && r <= 153, "an edge at {x}, {y}"); // 153 = 0.6 · 255
+    }
+}
+
+#[test]
+fn an_edge_has_the_wanted_length_in_true_proportions() {
+    let frame = Frame::new([30, 20]).unwrap().with_spacing([0.5, 2.0]).unwrap();
+    let image = Image::new(frame, Samples::F32(vec![0.0; 600])).unwrap();
+    // cells two samples wide along x, one millimetre: the median edge is 1 mm
+    let points = vec![[0.0, 0.0], [2.0, 0.0], [0.0, 0.5], [4.0, 0.0]];
+    let mesh = Mesh::new(points, vec![0, 1, 2]).unwrap();
+    let picture = draw_flat(&image, &mesh, &Style::default()).unwrap();
+    assert_eq!((picture.width(), picture.height()), (300, 800)); // 15 × 40 mm, 20 pixels a mm
+    let style = Style { units: Units::Samples, max_side: 600.0, ..Style::default() };
+    let picture = draw_flat(&image, &empty(), &style).unwrap();
+    assert_eq!((picture.width(), picture.height()), (600, 400));
+}
+
+#[test]
+fn outliers_and_missing_samples_leave_the_greys_as_they_are() {
+    let mut samples: Vec<f32> = (0..1000).map(|i| (i % 10) as f32).collect();
+    (samples[3], samples[500], samples[999]) = (f32::NAN, 1e30, f32::NEG_INFINITY);
+    let image = Image::new(Frame::new([100, 10]).unwrap(), Samples::F32(samples)).unwrap();
+    let style = Style { max_side: 100.0, brightness: 1.0, ..Style::default() };
+    let pixels = Pixels::of(&draw_flat(&image, &empty(), &style).unwrap());
+    assert_eq!(pixels.at(0.5, 0.5), [0; 3]);
+    assert_eq!(pixels.at(9.5, 0.5), [255; 3]);
+    assert_eq!(pixels.at(3.5, 0.5), [0; 3]); // not a number
+    let flat = Image::new(Frame::new([4, 4]).unwrap(), Samples::U8(vec![7; 16])).unwrap();
+    let pixels = Pixels::of(&draw_flat(&flat, &empty(), &style).unwrap());
+    assert_eq!(pixels.at(50.0, 50.0), [128; 3]);
+}
+
+#[test]
+fn svg_draws_each_edge_once_over_the_embedded_image() {
+    let style = Style { atoms: true, max_side: 90.0, edge_pixels: 1000.0, ..Style::default() };
+    let picture = draw_flat(&slope(9, 9), &square(9, 9), &style).unwrap();
+    let svg = String::from_utf8(picture.encode(PictureFormat::Svg).unwrap()).unwrap();
+    assert!(
+        svg.starts_with("<svg xmlns=\"http://www.w3.org/2000/svg\" width=\"90\" height=\"90\"")
+    );
+    assert_eq!(svg.matches("<image").count(), 1);
+    assert!(svg.contains("href=\"data:image/png;base64,iVBORw0KGgo"));
+    let edges = svg.lines().find(|l| l.contains("stroke=\"#ffffff\"")).unwrap();
+    // five edges, the diagonal among them
+    assert_eq!(edges.matches('L').count(), 5, "{edges}");
+    assert!(edges.contains("M5 5L85 85"), "{edges}");
+    assert_eq!(svg.matches("h0").count(), 4); // a dot for each atom
+}
+
+/// An image with a grey for each axis: 10 x + 20 y + 30 z.
+fn ramp(shape: [usize; 3]) -> Image<3> {
+    let [nx, ny, nz] = shape;
+    let mut samples = Vec::new();
+    for z in 0..nz {
+        for y in 0..ny {
+            samples.extend((0..nx).map(|x| (10 * x + 20 * y + 30 * z) as f32));
+        }
+    }
+    Image::new(Frame::new(shape).unwrap(), Samples::F32(samples)).unwrap()
+}
+
+/// One cell that is cut by all planes through its middle.
+fn corner_cell(side: f64) -> Mesh<3> {
+    let points = vec![[0.0; 3], [side, 0.0, 0.0], [0.0, side, 0.0], [0.0, 0.0, side]];
+    Mesh::new(points, vec![0, 1, 2, 3]).unwrap()
+}
+
+fn slices_style() -> Style {
+    Style { edge_pixels: 1000.0, max_side: 200.0, ..Style::default() }
+}
+
+/// The white lines of an SVG of slices, panel by panel, as paths.
+fn cut_paths(picture: &Picture) -> Vec<String> {
+    let svg = String::from_utf8(picture.encode(PictureFormat::Svg).unwrap()).unwrap();
+    let paths = svg.lines().filter(|l| l.contains("fill=\"none\" stroke=\"#ffffff\""));
+    paths.map(|l| l.split(" d=\"").nth(1).unwrap().trim_end_matches("\"/>").to_owned()).collect()
+}
+
+#[test]
+fn a_plane_through_a_tetrahedron_shows_a_triangle() {
+    let picture =
+        draw_slices(&ramp([9, 9, 9]), &corner_cell(8.0), [4; 3], &slices_style()).unwrap();
+    let paths = cut_paths(&picture);
+    assert_eq!(paths.len(), 3);
+    // the plane z = 4 cuts the cell x + y + z ≤ 8 in x + y ≤ 4; 200/18 pixels a sample, a panel of
+    // 100 and a gap of 4 to the left
+    let pixel = |i: f64, shift: f64| {
+        let text = format!("{:.2}", (i + 0.5) * 200.0 / 18.0 + shift);
+        text.trim_end_matches('0').trim_end_matches('.').to_owned()
+    };
+    let (top, left) = (pixel(0.0, 0.0), pixel(0.0, 104.0));
+    let (bottom, right) = (pixel(4.0, 0.0), pixel(4.0, 104.0));
+    assert_eq!(
+        paths[0],
+        format!(
+            "M{left} {top}L{left} {bottom}M{left} {top}L{right} {top}M{left} {bottom}L{right} {top}"
+        )
+    );
+}
+
+#[test]
+fn slices_on_the_faces_of_the_box_show_the_faces_there() {
+    // x = 0, y = 0 and z = 0 hold a face of the cell each; at the other end it has only a corner
+    let first = draw_slices(&ramp([9, 9, 9]), &corner_cell(8.0), [0; 3], &slices_style()).unwrap();
+    for path in cut_paths(&first) {
+        assert_eq!(path.matches('L').count(), 3, "{path}");
+    }
+    let last = draw_slices(&ramp([9, 9, 9]), &corner_cell(8.0), [8; 3], &slices_style()).unwrap();
+    for path in cut_paths(&last) {
+        assert_eq!(path.matches('L').count(), 0, "{path}");
+    }
+}
+
+#[test]
+fn panels_show_their_slices_and_red_lines_where_the_others_are() {
+    let shape = [6, 5, 4];
+    let at = [2, 1, 3];
+    let style = Style { brightness: 1.0, max_side: 220.0, ..Style::default() };
+    for z_up in [false, true] {
+        let style = Style { z_up, ..style.clone() };
+        let picture = draw_slices(&ramp(shape), &empty(), at, &style).unwrap();
+        let pixels = Pixels::of(&picture);
+        // 20 pixels a sample; the left column is 100 wide, the upper row 100 high, gaps of 4
+        let grey = |x: usize, y: usize, z: usize| {
+            let value = (10 * x + 20 * y + 30 * z) as f64;
+            [(value / 220.0 * 255.0).round() as u8; 3]
+        };
+        let up = |k: usize| if z_up { 3 - k } else { k };
+        let center = |i: usize, j: usize| (20.0 * i as f64 + 15.0, 20.0 * j as f64 + 5.0);
+        for k in 0..4 {
+            let (x, y) = center(k, k);
+            if k > 1 {
+                assert_eq!(pixels.at(104.0 + x, y), grey(k, k, 3), "X-Y at {k}, {k}");
+                assert_eq!(pixels.at(x, 104.0 + y), grey(2, k, up(k)), "Y-Z at {k}, {k}");
+            }
+            if k < 2 {
+                assert_eq!(pixels.at(104.0 + x, 104.0 + y), grey(k, 1, up(k)), "X-Z at {k}, {k}");
+            }
+        }
+        let red = |[r, g, b]: [u8; 3]| r > g.saturating_add(40) && r > b.saturating_add(40);
+        assert!(red(pixels.at(104.0 + 50.0, 80.0)), "x = 2 in X-Y");
+        assert!(red(pixels.at(104.0 + 10.0, 30.0)), "y = 1 in X-Y");
+        assert!(red(pixels.at(30.0, 104.0 + 20.0 * up(3) as f64 + 10.0)), "z = 3 in Y-Z");
+    }
+}
+
+#[test]
+fn places_and_styles_without_a_meaning_are_refused() {
+    let slice = draw_slices(&ramp([4, 5, 6]), &empty(), [1, 5, 1], &Style::default()).unwrap_err();
+    assert_eq!(slice, DrawError::Slice { axis: 1, at: 5, count: 5 });
+    assert_eq!(slice.to_string(), "slice 5 along axis 1 of an image with 5 samples");
+    for value in [0.0, -1.0, f64::NAN, 1.5] {
+        let style = Style { brightness: value, ..Style::default() };
+        let refused = draw_flat(&slope(4, 4), &empty(), &style).unwrap_err();
+        assert!(refused.to_string().starts_with("brightness is "), "{refused}");
+    }
+    let unknown = PictureFormat::of(Path::new("a.gif")).unwrap_err();
+    assert_eq!(unknown.to_string(), "\"a.gif\" is no picture by its name; expected .png or .svg");
+    assert_eq!(PictureFormat::of(Path::new("a.SVG")), Ok(PictureFormat::Svg));
+}
+
+#[test]
+fn the_same_picture_has_the_same_bytes() {
+    let draw =
+        || draw_slices(&ramp([9, 8, 7]), &corner_cell(6.0), [4; 3], &slices_style()).unwrap();
+    for format in [PictureFormat::Png, PictureFormat::Svg] {
+        assert!(draw().encode(format).unwrap() == draw().encode(format).unwrap());
+    }
+}
+
+proptest! {
+    #![proptest_config(ProptestConfig { cases: 32, ..ProptestConfig::default() })]
+
+    #[test]
+    fn any_mesh_over_any_image_is_drawn_within_the_limits(
+        shape in prop::array::uniform3(1usize..20),
+        points in prop::collection::vec(prop::array::uniform3(-1e3..1e3), 4..20),
+        corners in prop::collection::vec(0u32..4, 0..10),
+        sample in prop::num::f32::ANY,
+    ) {
+        let count = shape.iter().product();
+        let image = Image::new(Frame::new(shape).unwrap(), Samples::F32(vec![sample; count])).unwrap();
+        let corners = corners[..corners.len() / 4 * 4].to_vec();
+        let mesh = Mesh::new(points, corners).unwrap();
+        let style = Style { atoms: true, max_side: 300.0, ..Style::default() };
+        let picture = draw_slices(&image, &mesh, shape.map(|n| n / 2), &style).unwrap();
+        prop_assert!(picture.width() <= 306 && picture.height() <= 306);
+        picture.encode(PictureFormat::Png).unwrap();
+        picture.encode(PictureFormat::Svg).unwrap();
+    }
+}
