@@ -20,6 +20,10 @@ pub(super) trait Number: Copy + Send + Sync {
     fn put(self, endian: Endian, out: &mut Vec<u8>);
     /// Takes the number from exactly `SIZE` bytes.
     fn take(bytes: &[u8], endian: Endian) -> Self;
+    /// The nearest real number.
+    fn real(self) -> f64;
+    /// The same number as an index, if it is one.
+    fn index(self) -> Option<u32>;
 }
 
 macro_rules! number {
@@ -42,6 +46,15 @@ macro_rules! number {
                     Endian::Big => Self::from_be_bytes(array),
                 }
             }
+
+            fn real(self) -> f64 {
+                self as f64
+            }
+
+            fn index(self) -> Option<u32> {
+                let index = self as u32; // saturates or wraps, and then differs
+                (index as Self == self).then_some(index)
+            }
         }
     )*};
 }
@@ -51,8 +64,11 @@ number!(i8, u8, i16, u16, i32, u32, i64, u64, f32, f64);
 pub(super) struct Column<'a> {
     count: usize,
     item_size: usize,
-    fill: Box<dyn Fn(Range<usize>, &mut Vec<u8>) + Sync + 'a>,
+    fill: Box<Fill<'a>>,
 }
+
+/// Appends the bytes of a range of items.
+type Fill<'a> = dyn Fn(Range<usize>, &mut Vec<u8>) + Sync + 'a;
 
 impl<'a> Column<'a> {
     /// `count` items of `item_size` bytes; `fill` appends those of a range.

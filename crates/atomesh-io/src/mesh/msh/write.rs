@@ -111,7 +111,7 @@ impl<W: Write> Numbers<'_, W> {
     fn item(&mut self) -> Result<(), MeshWriteError> {
         self.line();
         self.done += 1;
-        if self.done % ITEMS_PER_STEP == 0 {
+        if self.done.is_multiple_of(ITEMS_PER_STEP) {
             check(self.watch, Phase::Write, (self.done as f64 / self.items).min(1.0), None)?;
         }
         if self.bytes.len() >= CHUNK { self.flush() } else { Ok(()) }

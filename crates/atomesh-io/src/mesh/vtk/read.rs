@@ -268,16 +268,16 @@ impl<'a> Reader<'a> {
         }
         self.line()?; // the data begin on the next line
         match kind {
-            "char" | "signed_char" => self.take::<i8>(count, f64::from),
-            "unsigned_char" => self.take::<u8>(count, f64::from),
-            "short" => self.take::<i16>(count, f64::from),
-            "unsigned_short" => self.take::<u16>(count, f64::from),
-            "int" => self.take::<i32>(count, f64::from),
-            "unsigned_int" => self.take::<u32>(count, f64::from),
-            "long" | "vtktypeint64" | "vtkIdType" => self.take::<i64>(count, |v| v as f64),
-            "unsigned_long" => self.take::<u64>(count, |v| v as f64),
-            "float" => self.take::<f32>(count, f64::from),
-            "double" => self.take::<f64>(count, |v| v),
+            "char" | "signed_char" => self.take::<i8>(count),
+            "unsigned_char" => self.take::<u8>(count),
+            "short" => self.take::<i16>(count),
+            "unsigned_short" => self.take::<u16>(count),
+            "int" => self.take::<i32>(count),
+            "unsigned_int" => self.take::<u32>(count),
+            "long" | "vtktypeint64" | "vtkIdType" => self.take::<i64>(count),
+            "unsigned_long" => self.take::<u64>(count),
+            "float" => self.take::<f32>(count),
+            "double" => self.take::<f64>(count),
             _ => Err(MeshReadError::Unsupported {
                 what: "array type",
                 found: kind.into(),
@@ -286,17 +286,13 @@ impl<'a> Reader<'a> {
         }
     }
 
-    fn take<T: Number>(
-        &mut self,
-        count: usize,
-        real: impl Fn(T) -> f64,
-    ) -> Result<Vec<f64>, MeshReadError> {
+    fn take<T: Number>(&mut self, count: usize) -> Result<Vec<f64>, MeshReadError> {
         let bytes = count.checked_mul(T::SIZE).and_then(|size| self.rest().get(..size));
         let bytes = bytes.ok_or_else(|| {
             malformed(self.at, format!("{count} numbers of {} bytes", T::SIZE), "the end")
         })?;
         self.at += bytes.len();
-        Ok(bytes.chunks_exact(T::SIZE).map(|b| real(T::take(b, Endian::Big))).collect())
+        Ok(bytes.chunks_exact(T::SIZE).map(|b| T::take(b, Endian::Big).real()).collect())
     }
 }
 

@@ -105,7 +105,7 @@ impl Array<'_> {
         if let Place::Text(at) = self.place {
             return self.parse(at, count);
         }
-        with_type!(self, T => self.numbers::<T, _>(count, |v| Some(v as f64)))
+        with_type!(self, T => self.numbers::<T, _>(count, |v| Some(v.real())))
     }
 
     /// Exactly `count` numbers as indices.
@@ -113,10 +113,7 @@ impl Array<'_> {
         if let Place::Text(at) = self.place {
             return self.parse(at, count);
         }
-        with_type!(self, T => self.numbers::<T, _>(count, |v| {
-            let index = v as u32;
-            (index as T == v).then_some(index)
-        }))
+        with_type!(self, T => self.numbers::<T, _>(count, T::index))
     }
 
     /// All numbers as bytes, as strings are kept.
