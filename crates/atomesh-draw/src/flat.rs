@@ -30,7 +30,7 @@ pub fn draw_flat(image: &Image<2>, mesh: &Mesh<2>, style: &Style) -> Result<Pict
     let ramp = Ramp::robust(image.samples(), style.brightness);
     let raster = ramp.raster(image.samples(), columns, rows, |i, j| i + columns * j);
     let rect = Rect { corner: [0.0; 2], size: extent.map(|e| e * scale) };
-    picture.shapes.push(Shape::Image { raster, rect });
+    picture.shapes.push(Shape::upright(raster, rect));
     let points = mesh.points();
     if style.edges {
         let lines = edges(mesh).iter().map(|e| e.map(|i| place(&points[i as usize]))).collect();

@@ -18,6 +18,7 @@ mod raster;
 mod slices;
 mod style;
 mod svg;
+mod view;
 
 pub use error::DrawError;
 pub use flat::draw_flat;

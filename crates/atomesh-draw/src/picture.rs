@@ -18,8 +18,9 @@ pub(crate) struct Rect {
 /// Something to draw; later shapes cover earlier ones.
 #[derive(Clone, Debug)]
 pub(crate) enum Shape {
-    /// Greys stretched over a rectangle, each sample a rectangle of one grey.
-    Image { raster: Raster, rect: Rect },
+    /// Greys stretched over a parallelogram, each sample a parallelogram of one grey: sample 0 is at
+    /// `corner`, and `right` and `down` are the sides along a row and a column.
+    Image { raster: Raster, corner: Place, right: Place, down: Place },
     /// A filled rectangle.
     Fill { rect: Rect, color: Color },
     /// Straight lines, round at their ends.
@@ -28,6 +29,14 @@ pub(crate) enum Shape {
     Discs { centers: Vec<Place>, radius: f64, color: Color },
     /// Filled squares of one half side.
     Squares { centers: Vec<Place>, half: f64, color: Color },
+}
+
+impl Shape {
+    /// Greys stretched over a rectangle.
+    pub fn upright(raster: Raster, rect: Rect) -> Self {
+        let ([width, height], corner) = (rect.size, rect.corner);
+        Self::Image { raster, corner, right: [width, 0.0], down: [0.0, height] }
+    }
 }
 
 /// The kinds of picture files.

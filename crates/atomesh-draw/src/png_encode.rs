@@ -2,7 +2,7 @@
 
 use tiny_skia::{FillRule, LineCap, Paint, PathBuilder, Pixmap, Stroke, Transform};
 
-use crate::picture::{Picture, Rect, Shape};
+use crate::picture::{Picture, Place, Shape};
 use crate::raster::Raster;
 use crate::{Color, DrawError};
 
@@ -49,7 +49,9 @@ fn rgb_png(
 
 fn draw(pixmap: &mut Pixmap, shape: &Shape) {
     match shape {
-        Shape::Image { raster, rect } => image(pixmap, raster, rect),
+        Shape::Image { raster, corner, right, down } => {
+            image(pixmap, raster, *corner, [*right, *down]);
+        }
         Shape::Fill { rect, color } => {
             let [x, y] = rect.corner.map(|v| v as f32);
             let [w, h] = rect.size.map(|v| v as f32);
@@ -104,29 +106,36 @@ fn paint([r, g, b]: Color) -> Paint<'static> {
     paint
 }
 
-/// Gives each pixel of the rectangle the grey of the sample that its centre lies on.
-fn image(pixmap: &mut Pixmap, raster: &Raster, rect: &Rect) {
-    let columns = covering(rect.corner[0], rect.size[0], raster.columns, pixmap.width());
-    let rows = covering(rect.corner[1], rect.size[1], raster.rows, pixmap.height());
+/// Gives each pixel of the parallelogram the grey of the sample that its centre lies on.
+fn image(pixmap: &mut Pixmap, raster: &Raster, corner: Place, [right, down]: [Place; 2]) {
+    let area = right[0] * down[1] - right[1] * down[0];
+    if area == 0.0 {
+        return; // seen edge-on
+    }
+    let [xs, ys] = std::array::from_fn(|k| {
+        let ends = [0.0, right[k], down[k], right[k] + down[k]].map(|v| v + corner[k]);
+        let limit = [pixmap.width(), pixmap.height()][k] as usize;
+        let min = ends.iter().copied().fold(f64::INFINITY, f64::min).max(0.0) as usize;
+        let max = ends.iter().copied().fold(0.0, f64::max).ceil() as usize;
+        min..max.min(limit)
+    });
     let width = pixmap.width() as usize;
     let pixels = pixmap.pixels_mut();
-    for &(y, row) in &rows {
-        for &(x, column) in &columns {
-            let grey = raster.greys[row * raster.columns + column];
-            pixels[y * width + x] =
-                tiny_skia::ColorU8::from_rgba(grey, grey, grey, 255).premultiply();
+    for y in ys {
+        for x in xs.clone() {
+            let (dx, dy) = (x as f64 + 0.5 - corner[0], y as f64 + 0.5 - corner[1]);
+            let column = sample((dx * down[1] - dy * down[0]) / area, raster.columns);
+            let row = sample((dy * right[0] - dx * right[1]) / area, raster.rows);
+            if let (Some(column), Some(row)) = (column, row) {
+                let grey = raster.greys[row * raster.columns + column];
+                pixels[y * width + x] =
+                    tiny_skia::ColorU8::from_rgba(grey, grey, grey, 255).premultiply();
+            }
         }
     }
 }
 
-/// The pixels whose centres lie in `start..start + length`, each with the sample it lies on, of
-/// `count` samples that share the length.
-fn covering(start: f64, length: f64, count: usize, pixels: u32) -> Vec<(usize, usize)> {
-    (0..pixels as usize)
-        .filter_map(|pixel| {
-            let share = (pixel as f64 + 0.5 - start) / length;
-            let inside = (0.0..1.0).contains(&share);
-            inside.then(|| (pixel, ((share * count as f64) as usize).min(count - 1)))
-        })
-        .collect()
+/// Which of `count` samples lies at that share of their side.
+fn sample(share: f64, count: usize) -> Option<usize> {
+    (0.0..1.0).contains(&share).then(|| ((share * count as f64) as usize).min(count - 1))
 }

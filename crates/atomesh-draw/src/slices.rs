@@ -8,6 +8,7 @@ use crate::flat::{scale, typical_length};
 use crate::label::label;
 use crate::picture::{Picture, Place, Rect, Shape};
 use crate::raster::Ramp;
+use crate::view::view;
 use crate::{DrawError, Style};
 
 /// Pixels between panels.
@@ -36,7 +37,7 @@ const PLANES: [(Plane, [usize; 2]); 3] = [
 ];
 
 /// Draws the slices through sample `at` of an image with the cuts of the mesh's faces, as in figure 9
-/// of Hale (2001); red lines show where the other slices pass. With [`Style::atoms`], atoms within one
+/// of Hale (2001), beside a view of the slices in space; red lines show where the other slices pass. With [`Style::atoms`], atoms within one
 /// sample of a slice are drawn as squares.
 ///
 /// The mesh is in sample coordinates. Cost: O(pixels + samples of the slices + cells).
@@ -65,6 +66,8 @@ pub fn draw_slices(
     let ramp = Ramp::robust(image.samples(), style.brightness);
 
     let mut picture = Picture::new(extent.map(|e| e * scale + GAP));
+    let corner = Rect { corner: [0.0; 2], size: [sides[1] * scale; 2] };
+    picture.shapes.extend(view(image, at, style, corner));
     for (plane, [column, row]) in &PLANES {
         let corner =
             [*column as f64 * (sides[1] * scale + GAP), *row as f64 * (sides[1] * scale + GAP)];
@@ -140,7 +143,7 @@ impl Panel<'_> {
             let j = if self.flipped() { shape[down] - 1 - j } else { j };
             start + i * strides[right] + j * strides[down]
         });
-        Shape::Image { raster, rect: self.rect }
+        Shape::upright(raster, self.rect)
     }
 
     /// Where the plane cuts the faces of the cells, each line once, in pixels.

@@ -24,13 +24,17 @@ pub(crate) fn encode(picture: &Picture) -> Result<Vec<u8>, DrawError> {
 
 fn draw(out: &mut String, shape: &Shape) -> Result<(), DrawError> {
     match shape {
-        Shape::Image { raster, rect } => {
+        Shape::Image { raster, corner, right, down } => {
             let png = STANDARD.encode(png_encode::encode_raster(raster)?);
-            let [[x, y], [w, h]] = [rect.corner, rect.size].map(|p| p.map(number));
+            let (w, h) = (raster.columns, raster.rows);
+            let sides = [right.map(|v| v / w as f64), down.map(|v| v / h as f64)];
+            let [[a, b], [c, d]] = sides;
+            let [e, f] = corner.map(number);
             line(
                 out,
                 format_args!(
-                    "<image x=\"{x}\" y=\"{y}\" width=\"{w}\" height=\"{h}\" preserveAspectRatio=\"none\" \
+                    "<image width=\"{w}\" height=\"{h}\" \
+                     transform=\"matrix({a:.6} {b:.6} {c:.6} {d:.6} {e} {f})\" \
                      style=\"image-rendering:pixelated\" href=\"data:image/png;base64,{png}\"/>"
                 ),
             );
