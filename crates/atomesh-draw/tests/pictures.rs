@@ -221,6 +221,34 @@ fn panels_show_their_slices_and_red_lines_where_the_others_are() {
 }
 
 #[test]
+fn the_view_in_space_shows_what_is_nearest() {
+    // each slice has a value of its own
+    let mut samples = vec![0.0f32; 729];
+    for (i, sample) in samples.iter_mut().enumerate() {
+        let [x, y, z] = [i % 9, i / 9 % 9, i / 81];
+        *sample = match (z == 4, y == 4, x == 4) {
+            (true, ..) => 90.0,
+            (_, true, _) => 60.0,
+            (.., true) => 30.0,
+            _ => 0.0,
+        };
+    }
+    let image = Image::new(Frame::new([9; 3]).unwrap(), Samples::F32(samples)).unwrap();
+    let grey = |value: f64| [(value / 90.0 * 0.85 * 255.0).round() as u8; 3];
+    for z_up in [false, true] {
+        let style = Style { z_up, max_side: 400.0, ..Style::default() };
+        let pixels = Pixels::of(&draw_slices(&image, &empty(), [4; 3], &style).unwrap());
+        // the slices meet near the middle of the panel, 100, 100; the eye is above: below the middle
+        // lies the near half of the horizontal slice, above it the vertical slices hide the far half
+        assert_eq!(pixels.at(95.0, 112.0), grey(90.0), "z up: {z_up}");
+        let sides = [pixels.at(70.0, 75.0), pixels.at(125.0, 75.0)];
+        assert_eq!(sides, [grey(60.0), grey(30.0)], "z up: {z_up}");
+        let corner = pixels.at(3.0, 3.0);
+        assert!(corner[0] < corner[2], "no slice reaches the corner: {corner:?}");
+    }
+}
+
+#[test]
 fn places_and_styles_without_a_meaning_are_refused() {
     let slice = draw_slices(&ramp([4, 5, 6]), &empty(), [1, 5, 1], &Style::default()).unwrap_err();
     assert_eq!(slice, DrawError::Slice { axis: 1, at: 5, count: 5 });
