@@ -59,7 +59,8 @@ fn fan<const D: usize>(count: usize) -> Mesh<D> {
     let points = (0..count + D).map(|i| {
         std::array::from_fn(|k| noise(3 * i + k) * 10f64.powi((i as i32 + k as i32) % 7 - 3))
     });
-    let corners = (0..count as u32).flat_map(|i| (0..=D as u32).map(move |k| i + k));
+    // from the last cell to the first, so that the first corners have bytes above 127
+    let corners = (0..count as u32).rev().flat_map(|i| (0..=D as u32).map(move |k| i + k));
     Mesh::new(points.collect(), corners.collect()).unwrap()
 }
 

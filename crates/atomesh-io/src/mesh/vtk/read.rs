@@ -109,23 +109,18 @@ impl<'a> Reader<'a> {
     /// Cells as lists that begin with their length, or, since 5.0, as offsets and corners.
     fn cells(&mut self) -> Result<(), MeshReadError> {
         let (first, second) = (self.count()?, self.count()?);
-        let before = self.at;
-        if self.keyword()? == Some("OFFSETS") {
+        if self.accept("OFFSETS") {
             let kind = self.word()?;
             let offsets = self.numbers(kind, first, 1)?;
             self.cells.ends = offsets.iter().skip(1).map(|&end| end as usize).collect();
-            if self.keyword()? != Some("CONNECTIVITY") {
-                return Err(malformed(
-                    self.at,
-                    "CONNECTIVITY before this",
-                    excerpt(self.bytes, self.at),
-                ));
+            if !self.accept("CONNECTIVITY") {
+                return Err(malformed(self.at, "CONNECTIVITY", excerpt(self.bytes, self.at)));
             }
             let kind = self.word()?;
             self.cells.corners = self.numbers(kind, second, 1)?;
             return Ok(());
         }
-        self.at = before;
+        let before = self.at;
         let list = self.numbers("int", second, 1)?;
         let mut rest = &list[..];
         while let [length, tail @ ..] = rest {
@@ -166,11 +161,8 @@ impl<'a> Reader<'a> {
             "" => 1,
             n => n.parse().map_err(|_| malformed(self.at, "components before this", n))?,
         };
-        let before = self.at;
-        if self.keyword()? == Some("LOOKUP_TABLE") {
+        if self.accept("LOOKUP_TABLE") {
             self.word()?;
-        } else {
-            self.at = before;
         }
         let values = self.numbers(kind, self.tuples()?, components)?;
         self.keep(parts, name, components, values);
@@ -233,6 +225,16 @@ impl<'a> Reader<'a> {
         let word = word.map_err(|_| malformed(self.at, "a word", excerpt(self.bytes, self.at)))?;
         self.at += length;
         Ok((length > 0).then_some(word))
+    }
+
+    /// Passes over a word, if it comes next; what comes next may be binary.
+    fn accept(&mut self, word: &str) -> bool {
+        let blanks = self.rest().iter().take_while(|b| b.is_ascii_whitespace()).count();
+        let found = self.rest()[blanks..].starts_with(word.as_bytes());
+        if found {
+            self.at += blanks + word.len();
+        }
+        found
     }
 
     fn word(&mut self) -> Result<&'a str, MeshReadError> {
