@@ -107,6 +107,11 @@ impl Lbfgs {
         self.state.evaluations
     }
 
+    /// The last step, as a multiple of the direction that it went along.
+    pub fn last_step(&self) -> f64 {
+        self.state.last_step
+    }
+
     /// One iteration: a direction, a line search, a step if the value falls.
     pub fn iterate(&mut self, objective: &mut impl Objective) -> Step {
         if !self.state.value.is_finite() {
@@ -231,7 +236,7 @@ mod tests {
             }
             value
         }
-        fn longest_step(&self, direction: &[f64]) -> f64 {
+        fn longest_step(&mut self, direction: &[f64]) -> f64 {
             0.25 / direction.iter().fold(1e-300f64, |m, p| m.max(p.abs()))
         }
         fn confine(&self, x: &mut [f64]) {

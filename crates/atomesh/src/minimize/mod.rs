@@ -20,7 +20,7 @@ pub trait Objective {
     fn evaluate(&mut self, x: &[f64], gradient: &mut [f64]) -> f64;
 
     /// The largest multiple of `direction` that one step may move the variables by. Default: no limit.
-    fn longest_step(&self, direction: &[f64]) -> f64 {
+    fn longest_step(&mut self, direction: &[f64]) -> f64 {
         let _ = direction;
         f64::INFINITY
     }

@@ -30,6 +30,8 @@ pub(super) struct State {
     pub trial_x: Vec<f64>,
     pub trial_gradient: Vec<f64>,
     pub evaluations: usize,
+    /// The last trial's multiple of its direction.
+    pub last_step: f64,
 }
 
 impl State {
@@ -41,6 +43,7 @@ impl State {
             trial_gradient: zeros,
             value: f64::INFINITY,
             evaluations: 0,
+            last_step: 0.0,
             x,
         }
     }
@@ -100,6 +103,7 @@ impl State {
         update(&mut self.trial_x, direction, |x, p| *x += alpha * p);
         objective.confine(&mut self.trial_x);
         self.evaluations += 1;
+        self.last_step = alpha;
         objective.evaluate(&self.trial_x, &mut self.trial_gradient)
     }
 

@@ -15,7 +15,13 @@ pub(super) struct LatticeEnergy<E, const D: usize> {
     lattice: Lattice<D>,
     engine: E,
     margin: f64,
+    /// The farthest an atom may go in any iteration, over its nominal distance.
     longest_move: f64,
+    /// The farthest it may go in the next one: twice the last move, since moves shrink towards a minimum
+    /// and the engine need not be ready for more.
+    next_move: f64,
+    /// The farthest that the last direction moves an atom, over its nominal distance.
+    reach: f64,
     /// dx/dz of each variable, 0…1.
     mobility: Vec<f32>,
     /// Whether some mobility is neither 0 nor 1, so that x differs from z.
@@ -30,7 +36,17 @@ impl<E: Engine<D>, const D: usize> LatticeEnergy<E, D> {
             (0..lattice.len() * D).map(|v| lattice.mobility(v / D, v % D) as f32).collect();
         engine.prepare(lattice.atoms(), longest_move);
         let tempered = mobility.iter().any(|&m| m != 0.0 && m != 1.0);
-        Self { lattice, engine, margin, longest_move, mobility, tempered, atoms: Vec::new() }
+        Self {
+            lattice,
+            engine,
+            margin,
+            longest_move,
+            next_move: longest_move,
+            reach: 0.0,
+            mobility,
+            tempered,
+            atoms: Vec::new(),
+        }
     }
 
     /// The variables of the lattice as it was given.
@@ -56,11 +72,22 @@ impl<E: Engine<D>, const D: usize> LatticeEnergy<E, D> {
         }
     }
 
-    /// Readies the engine between iterations; says whether the energy has become another function.
+    /// Readies the engine for a first iteration from `z`; says whether the energy has become another
+    /// function.
     pub fn prepare(&mut self, z: &[f64]) -> bool {
+        self.prepare_for(z, self.longest_move)
+    }
+
+    /// Readies the engine for the iteration after one that went `last_step` times its direction.
+    pub fn prepare_after(&mut self, z: &[f64], last_step: f64) -> bool {
+        self.prepare_for(z, (2.0 * last_step * self.reach).min(self.longest_move))
+    }
+
+    fn prepare_for(&mut self, z: &[f64], next_move: f64) -> bool {
+        self.next_move = next_move;
         self.temper(z);
         let atoms = if self.tempered { &self.atoms[..] } else { z.as_chunks::<D>().0 };
-        self.engine.prepare(atoms, self.longest_move)
+        self.engine.prepare(atoms, next_move)
     }
 
     /// The energy at `z`, for the report.
@@ -124,7 +151,7 @@ impl<E: Engine<D>, const D: usize> Objective for LatticeEnergy<E, D> {
         energy.total()
     }
 
-    fn longest_step(&self, direction: &[f64]) -> f64 {
+    fn longest_step(&mut self, direction: &[f64]) -> f64 {
         let greatest = direction
             .as_chunks::<D>()
             .0
@@ -133,7 +160,8 @@ impl<E: Engine<D>, const D: usize> Objective for LatticeEnergy<E, D> {
             .with_min_len(CHUNK)
             .map(|(p, d)| p.iter().map(|x| x * x).sum::<f64>() / (d * d))
             .reduce(|| 0.0, f64::max); // a maximum is the same in any order
-        if greatest > 0.0 { self.longest_move / greatest.sqrt() } else { f64::INFINITY }
+        self.reach = greatest.sqrt();
+        if self.reach > 0.0 { self.next_move / self.reach } else { f64::INFINITY }
     }
 
     fn confine(&self, z: &mut [f64]) {

@@ -298,7 +298,8 @@ impl<'r, E: Engine<D>, const D: usize> Run<'r, E, D> {
             }
             let done = (outer as f64 + 0.5) / self.options.outer_limit.max(1) as f64;
             check(watch, Phase::Optimize, done, Some(value))?;
-            if self.energy.prepare(self.minimizer.x()) {
+            let last_step = self.minimizer.last_step();
+            if self.energy.prepare_after(self.minimizer.x(), last_step) {
                 self.minimizer.restart(&mut self.energy);
             }
         }

@@ -12,6 +12,10 @@ use crate::geometry::{Bounds, Point, distance_squared};
 /// Atoms whose lists are stored together, and the unit of parallel work.
 pub(super) const CHUNK: usize = 512;
 
+/// Coarse cells are this many times as wide as the longest reach: wide enough that most balls touch few
+/// of them, narrow enough that d varies little within one.
+const WIDTH: f64 = 4.0;
+
 /// The lists of [`CHUNK`] consecutive atoms.
 #[derive(Clone, Debug, Default)]
 pub(super) struct Chunk {
@@ -49,18 +53,26 @@ impl NeighborLists {
         self.chunks.resize_with(atoms.len().div_ceil(CHUNK), Chunk::default);
         let Some(bounds) = Bounds::of(atoms) else { return };
         let longest = reach.range.iter().copied().fold(0.0, f64::max);
-        let cells = Cells::new(atoms, &bounds, longest);
+        let cells = Cells::new(atoms, reach.range, &bounds, WIDTH * longest);
         self.chunks.par_iter_mut().enumerate().for_each(|(c, chunk)| {
             chunk.starts.clear();
             chunk.neighbors.clear();
             for i in c * CHUNK..((c + 1) * CHUNK).min(atoms.len()) {
                 chunk.starts.push(chunk.neighbors.len() as u32);
-                let farthest = reach.farthest(i, longest);
-                cells.visit(&atoms[i], farthest, |j, p| {
-                    let range = 0.5 * (reach.range[i] + reach.range[j as usize]);
-                    if distance_squared(p, &atoms[i]) < range * range && j as usize != i {
-                        chunk.neighbors.push(j);
+                let range = reach.range[i];
+                cells.visit(&atoms[i], reach.farthest(i, longest), |order, sorted| {
+                    // Room for the whole span, filled without a branch, then cut to what was found.
+                    let start = chunk.neighbors.len();
+                    chunk.neighbors.resize(start + order.len(), 0);
+                    let found = &mut chunk.neighbors[start..];
+                    let mut count = 0;
+                    for (&j, q) in order.iter().zip(sorted) {
+                        let within = 0.5 * (range + q.range);
+                        let near = distance_squared(&q.at, &atoms[i]) < within * within;
+                        found[count] = j;
+                        count += usize::from(near & (j as usize != i));
                     }
+                    chunk.neighbors.truncate(start + count);
                 });
             }
             chunk.starts.push(chunk.neighbors.len() as u32);
@@ -85,11 +97,18 @@ struct Cells<const D: usize> {
     /// Per fine cell: its first entry in `order`.
     starts: Vec<u32>,
     order: Vec<u32>,
-    sorted: Vec<Point<D>>,
+    sorted: Vec<Sorted<D>>,
+}
+
+/// An atom as a query reads it.
+#[derive(Clone, Copy)]
+struct Sorted<const D: usize> {
+    at: Point<D>,
+    range: f64,
 }
 
 impl<const D: usize> Cells<D> {
-    fn new(atoms: &[Point<D>], bounds: &Bounds<D>, width: f64) -> Self {
+    fn new(atoms: &[Point<D>], range: &[f64], bounds: &Bounds<D>, width: f64) -> Self {
         // At most a few coarse cells an atom, however far apart atoms are.
         let extent = bounds.extent();
         let mut width = if width > 0.0 { width } else { 1.0 };
@@ -110,7 +129,7 @@ impl<const D: usize> Cells<D> {
         };
         let coarse: Vec<u32> = atoms.par_iter().map(|p| cells.coarse_of(p) as u32).collect();
         cells.divide(&coarse);
-        cells.sort(atoms, &coarse);
+        cells.sort(atoms, range, &coarse);
         cells
     }
 
@@ -136,7 +155,7 @@ impl<const D: usize> Cells<D> {
     }
 
     /// Counting sort of the atoms by fine cell, stable in the atoms' order.
-    fn sort(&mut self, atoms: &[Point<D>], coarse: &[u32]) {
+    fn sort(&mut self, atoms: &[Point<D>], range: &[f64], coarse: &[u32]) {
         let fine: Vec<u32> = atoms
             .par_iter()
             .zip(coarse)
@@ -154,7 +173,8 @@ impl<const D: usize> Cells<D> {
             order[next[f as usize] as usize] = i as u32;
             next[f as usize] += 1;
         }
-        self.sorted = order.par_iter().map(|&i| atoms[i as usize]).collect();
+        let sorted = |&i: &u32| Sorted { at: atoms[i as usize], range: range[i as usize] };
+        self.sorted = order.par_iter().map(sorted).collect();
         (self.starts, self.order) = (starts, order);
     }
 
@@ -187,9 +207,10 @@ impl<const D: usize> Cells<D> {
         index
     }
 
-    /// Calls `found` with every atom in the cells that the ball of this radius around `p` may touch.
+    /// Calls `span` with runs of atoms, their indices and themselves, that together hold all in the ball
+    /// of this radius around `p`, and some beyond it.
     #[inline]
-    fn visit(&self, p: &Point<D>, radius: f64, mut found: impl FnMut(u32, &Point<D>)) {
+    fn visit(&self, p: &Point<D>, radius: f64, mut span: impl FnMut(&[u32], &[Sorted<D>])) {
         let (mut low, mut high) = ([0usize; D], [0usize; D]);
         for k in 0..D {
             low[k] = ((p[k] - radius - self.origin[k]) / self.width).max(0.0) as usize;
@@ -219,10 +240,8 @@ impl<const D: usize> Cells<D> {
                     at = at * m as usize + fine[k];
                 }
                 let first = base as usize + at;
-                let span = self.starts[first] as usize..self.starts[first + run + 1] as usize;
-                for (j, q) in self.order[span.clone()].iter().zip(&self.sorted[span]) {
-                    found(*j, q);
-                }
+                let run = self.starts[first] as usize..self.starts[first + run + 1] as usize;
+                span(&self.order[run.clone()], &self.sorted[run]);
             });
         });
     }
