@@ -8,6 +8,8 @@ mod crystal;
 mod grow;
 mod occupancy;
 mod scatter;
+#[cfg(test)]
+mod tests;
 
 pub use crystal::{Crystal, CrystalKind};
 pub use grow::{GrowOptions, LatticeError, grow};

@@ -8,6 +8,8 @@
 
 mod energy;
 mod report;
+#[cfg(test)]
+mod tests;
 
 pub use report::{EngineKind, OptimizeReport, Stage, Stop};
 

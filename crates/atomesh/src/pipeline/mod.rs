@@ -24,6 +24,8 @@ mod estimate;
 mod method;
 mod options;
 mod outcome;
+#[cfg(test)]
+mod tests;
 
 pub use error::{PipelineError, Warning};
 pub use estimate::Estimate;

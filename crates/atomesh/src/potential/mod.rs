@@ -12,6 +12,8 @@ mod neighbors;
 mod pairs;
 mod sampled;
 mod spline;
+#[cfg(test)]
+mod tests;
 
 pub use engine::{Energy, Engine, ImageWeight, direct_energy};
 pub use image::{ImagePotential, Interpolation, PotentialError};

@@ -4,8 +4,11 @@
 //! tabulated potentials; P is read at the sample nearest to each atom, equation (6), and its gradient by
 //! centred differences. Cost: O(N) in image samples, some 8N additions in 2-D and 20N in 3-D.
 //!
-//! Energy and gradient do not quite belong together: the energy is constant within a sample. What it
-//! errs by falls as d grows in samples.
+//! Energy and gradient do not quite belong together: the energy is constant within a sample. Atoms count
+//! as if at their nearest samples, so what it errs by against the double sum is of first order in 1/d, d
+//! in samples: in a lattice at d = 8 the gradient, times d, by 0.1, half as much at 16; the energy of
+//! an atom by 0.004 and less, since errors of neighbouring pairs cancel in part. Atoms on the image's
+//! boundary feel their own tables along its normal, where differences are one-sided.
 
 use std::ops::Range;
 
