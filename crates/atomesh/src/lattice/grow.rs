@@ -1,10 +1,12 @@
 //! Growing a lattice outward from a seed (Hale 2001, algorithm 2), boundary first.
 //!
 //! Assumes d(x) is smooth, |∇d| ≪ 1. Corners, then edges of the box, divided evenly in ∫dx/d; then, in
-//! 3-D, its faces, grown as hexagonal crystals from their centres; then the interior from the seeds, or
-//! from the centre, as the wanted crystal. Visits atoms breadth first, tries their ideal neighbour sites
-//! in crystal order, and takes a site if the ball of diameter γ d around it is free. Coordinates are
-//! snapped to binary fractions, so that a perfect crystal stays perfect. Cost: O(atoms). Deterministic.
+//! 3-D, its faces, grown as hexagonal crystals from their centres, each as if the others were not there;
+//! then the interior from the seeds, or from the centre, as the wanted crystal. Visits atoms breadth
+//! first, tries their ideal neighbour sites in crystal order, and takes a site if the ball of diameter
+//! γ d around it is free. Where growth could not pass, because the box is narrower than d there, it starts
+//! again from the boundary. Coordinates are snapped to binary fractions, so that a perfect crystal stays
+//! perfect. Cost: O(atoms). Deterministic.
 
 use crate::distance::NominalDistance;
 use crate::geometry::{Bounds, Point, distance_squared};
@@ -104,11 +106,13 @@ pub fn grow<const D: usize>(
     for p in lattice.atoms() {
         occupancy.take(*p, gamma * distance.at(p));
     }
-    let mut growth = Growth { lattice, occupancy, distance, gamma, quantum, expected };
+    // the user's atoms come first, each once
+    let seeds = lattice.atoms().iter().take_while(|p| options.seed_points.contains(p)).count();
+    let mut growth = Growth { lattice, occupancy, distance, gamma, quantum, seeds, expected };
     for face in 0..if D == 3 { 6 } else { 0 } {
         growth.face(face / 2, face % 2 == 1, watch)?;
     }
-    growth.interior(crystal, options.seed_points.len(), watch)?;
+    growth.interior(crystal, watch)?;
     Ok(growth.lattice)
 }
 
@@ -139,6 +143,7 @@ impl<'a, const D: usize> Boundary<'a, D> {
         seeds: &[Point<D>],
     ) -> Result<Lattice<D>, LatticeError> {
         self.plant(seeds)?;
+        let given = self.lattice.len();
         let Bounds { min, max } = self.lattice.bounds;
         let corner = |c: usize| -> Point<D> {
             std::array::from_fn(|k| if c >> k & 1 == 1 { max[k] } else { min[k] })
@@ -148,7 +153,6 @@ impl<'a, const D: usize> Boundary<'a, D> {
                 self.lattice.push(corner(c), 0, 0.0);
             }
         }
-        let given = seeds.len();
         for axis in 0..D {
             for c in (0..1 << D).filter(|c| c >> axis & 1 == 0) {
                 for x in even_steps(&corner(c), axis, max[axis], self.distance) {
@@ -157,7 +161,7 @@ impl<'a, const D: usize> Boundary<'a, D> {
                     // only a fixed atom can be in the way
                     let reach = 0.5 * self.distance.at(&p);
                     let near = |q: &Point<D>| distance_squared(q, &p) < reach * reach;
-                    if !self.lattice.atoms[..given.min(self.lattice.len())].iter().any(near) {
+                    if !self.lattice.atoms[..given].iter().any(near) {
                         self.lattice.push(p, 1 << axis, 1.0);
                     }
                 }
@@ -192,8 +196,14 @@ struct Growth<'a, const D: usize> {
     distance: &'a NominalDistance<D>,
     gamma: f64,
     quantum: f64,
+    /// How many of the first atoms are the user's.
+    seeds: usize,
     expected: f64,
 }
+
+/// Where growth starts again from the boundary, a site must be this far from other atoms, in d: holes in
+/// a crystal are smaller, so that where growth has passed little is added.
+const RESTART: f64 = 0.85;
 
 impl<const D: usize> Growth<'_, D> {
     fn snap(&self, p: Point<D>) -> Point<D> {
@@ -231,25 +241,42 @@ impl<const D: usize> Growth<'_, D> {
             })
             .collect();
         let freedom = axes.iter().map(|k| 1u8 << k).sum();
+        // Atoms of the opposite face, nearer than d in a thin box, do not count; nor do those beside.
+        let on_face: Vec<usize> = (0..self.lattice.len())
+            .filter(|&i| self.lattice.atoms[i][normal] == centre[normal])
+            .collect();
+        let mut flat = Bounds { min, max };
+        (flat.min[normal], flat.max[normal]) = (centre[normal], centre[normal]);
+        let (least, greatest) = (self.distance.least(), self.distance.greatest());
+        let plane = Occupancy::new(flat, self.gamma * least, self.gamma * greatest, on_face.len());
+        let whole = std::mem::replace(&mut self.occupancy, plane);
+        for i in (0..self.seeds).chain(on_face.iter().copied()) {
+            let p = self.lattice.atoms[i];
+            self.occupancy.take(p, self.gamma * self.distance.at(&p));
+        }
         let first = self.lattice.len();
         if self.is_free(&centre) {
             self.add(centre, freedom, 1.0);
         }
-        self.spread(first, &steps, freedom, watch)
+        self.fill(first, &on_face, &steps, freedom, watch)?;
+        self.occupancy = whole;
+        for p in &self.lattice.atoms[first..] {
+            self.occupancy.take(*p, self.gamma * self.distance.at(p));
+        }
+        Ok(())
     }
 
-    /// The inside of the box, from the first `seeds` atoms and the centre.
+    /// The inside of the box, from the seeds or the centre.
     fn interior(
         &mut self,
         crystal: &Crystal<D>,
-        seeds: usize,
         watch: &mut dyn Watch,
     ) -> Result<(), LatticeError> {
         let Bounds { min, max } = self.lattice.bounds;
         let freedom = ((1usize << D) - 1) as u8;
         let first = self.lattice.len();
-        for s in 0..seeds.min(first) {
-            self.surround(s, crystal.neighbors(), freedom);
+        for s in 0..self.seeds {
+            self.surround(s, crystal.neighbors(), freedom, self.gamma);
         }
         if self.lattice.len() == first {
             let centre = self.snap(std::array::from_fn(|k| 0.5 * (min[k] + max[k])));
@@ -257,7 +284,26 @@ impl<const D: usize> Growth<'_, D> {
                 self.add(centre, freedom, 1.0);
             }
         }
-        self.spread(first, crystal.neighbors(), freedom, watch)
+        let boundary: Vec<usize> = (0..first).collect();
+        self.fill(first, &boundary, crystal.neighbors(), freedom, watch)
+    }
+
+    /// Grows from the atoms from `first` on; then, where that left room, from those of the `rim`.
+    fn fill(
+        &mut self,
+        first: usize,
+        rim: &[usize],
+        steps: &[Point<D>],
+        freedom: u8,
+        watch: &mut dyn Watch,
+    ) -> Result<(), LatticeError> {
+        self.spread(first, steps, freedom, watch)?;
+        for &i in rim {
+            let next = self.lattice.len();
+            self.surround(i, steps, freedom, (2.0 * RESTART - self.gamma).max(self.gamma));
+            self.spread(next, steps, freedom, watch)?;
+        }
+        Ok(())
     }
 
     /// Algorithm 2's loop: the atoms from `first` on are the queue of those whose sites are still to be
@@ -275,14 +321,14 @@ impl<const D: usize> Growth<'_, D> {
                 let done = (self.lattice.len() as f64 / self.expected.max(1.0)).min(1.0);
                 check(watch, Phase::Grow, done, None)?;
             }
-            self.surround(at, steps, freedom);
+            self.surround(at, steps, freedom, self.gamma);
             at += 1;
         }
         Ok(())
     }
 
-    /// Puts atoms on the free ideal sites around atom `i`.
-    fn surround(&mut self, i: usize, steps: &[Point<D>], freedom: u8) {
+    /// Puts atoms on the ideal sites around atom `i` where a ball of diameter `room` d is free.
+    fn surround(&mut self, i: usize, steps: &[Point<D>], freedom: u8, room: f64) {
         let Bounds { min, max } = self.lattice.bounds;
         let from = self.lattice.atoms[i];
         let d = self.distance.at(&from);
@@ -292,7 +338,7 @@ impl<const D: usize> Growth<'_, D> {
             let inside = (0..D).all(|k| {
                 if freedom >> k & 1 == 1 { min[k] < site[k] && site[k] < max[k] } else { true }
             });
-            if inside && self.is_free(&site) {
+            if inside && self.occupancy.is_free(&site, room * self.distance.at(&site)) {
                 self.add(site, freedom, 1.0);
             }
         }

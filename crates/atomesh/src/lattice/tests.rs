@@ -155,8 +155,8 @@ fn the_inside_is_a_perfect_crystal<const D: usize>(
 #[test]
 fn a_constant_distance_gives_a_perfect_crystal_inside() {
     the_inside_is_a_perfect_crystal(&Crystal::hexagonal(), 60, &Delaunay::<2>::new());
-    the_inside_is_a_perfect_crystal(&Crystal::body_centered_cubic(), 25, &Delaunay::<3>::new());
-    the_inside_is_a_perfect_crystal(&Crystal::face_centered_cubic(), 25, &Delaunay::<3>::new());
+    the_inside_is_a_perfect_crystal(&Crystal::body_centered_cubic(), 31, &Delaunay::<3>::new());
+    the_inside_is_a_perfect_crystal(&Crystal::face_centered_cubic(), 31, &Delaunay::<3>::new());
 }
 
 /// The farthest that a place of the box is from its nearest atom, over d there, by trying many.
