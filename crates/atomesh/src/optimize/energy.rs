@@ -90,11 +90,12 @@ impl<E: Engine<D>, const D: usize> LatticeEnergy<E, D> {
         self.engine.prepare(atoms, next_move)
     }
 
-    /// The energy at `z`, for the report.
+    /// The energy at `z`, d and β read there, for the report.
     pub fn evaluate_at(&mut self, z: &[f64]) -> Energy {
         let mut gradient = vec![[0.0; D]; z.len() / D];
-        self.prepare(z);
+        self.temper(z);
         let atoms = if self.tempered { &self.atoms[..] } else { z.as_chunks::<D>().0 };
+        self.engine.prepare(atoms, 1.0); // farther than any list reaches: all is read anew
         self.engine.evaluate(atoms, &mut gradient)
     }
 

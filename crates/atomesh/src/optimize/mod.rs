@@ -44,7 +44,7 @@ pub struct OptimizeOptions {
     /// How near to a side of the box a free atom may come, over its nominal distance: what is nearer
     /// would make flat cells. Default 0.35.
     pub margin: f64,
-    /// Stages with a smoothed b(x) before the sharp one. Default 0.
+    /// Stages with a smoothed b(x) before the sharp one, 10 or less. Default 0.
     pub smoothing_steps: usize,
     /// The seed of the perturbations. Default 0.
     pub seed: u64,
@@ -104,6 +104,7 @@ impl OptimizeOptions {
             ("perturbation", self.perturbation, 0.0..0.5, "0 or more, below 0.5"),
             ("longest_move", self.longest_move, 1e-6..0.5, "above 0, below 0.5"),
             ("margin", self.margin, 0.0..0.5, "0 or more, below 0.5"),
+            ("smoothing_steps", self.smoothing_steps as f64, 0.0..10.5, "10 or less"),
         ];
         for (name, value, range, expected) in checks {
             if !range.contains(&value) {
@@ -236,24 +237,32 @@ impl<'r, E: Engine<D>, const D: usize> Run<'r, E, D> {
         self.minimizer.restart(&mut self.energy);
         self.note_start();
         let mut random = Pcg64::seed_from_u64(self.options.seed);
-        let mut best: Option<(f64, Vec<f64>)> = None;
+        let start = self.minimizer.x().to_vec();
+        let mut best = (self.minimizer.value(), start.clone());
         self.stage.stop = Stop::OuterLimit;
         for outer in 0..self.options.outer_limit.max(1) {
+            let done = outer as f64 / self.options.outer_limit.max(1) as f64;
+            check(watch, Phase::Optimize, done, None)?;
             let before = self.minimizer.value();
             self.perturb(&mut random);
             let inner_stop = self.descend(outer, watch)?;
             let value = self.minimizer.value();
             self.stage.perturbations += 1;
-            if best.as_ref().is_none_or(|(least, _)| value < *least) {
-                best = Some((value, self.minimizer.x().to_vec()));
+            if value < best.0 {
+                best = (value, self.minimizer.x().to_vec());
             }
             if before - value <= self.options.tolerance * before.abs() {
                 self.stage.stop = inner_stop;
                 break;
             }
         }
-        let x = best.map_or_else(|| self.minimizer.x().to_vec(), |(_, x)| x);
-        let energy = self.energy.evaluate_at(&x);
+        let mut x = best.1;
+        let mut energy = self.energy.evaluate_at(&x);
+        // d and β were read where atoms had been: read where they are, the start may be the better one
+        if energy.total() > self.stage.energy_first {
+            x = start;
+            energy = self.energy.evaluate_at(&x);
+        }
         self.stage.energy_last = energy.total();
         self.report.finish_stage(self.stage, energy, self.minimizer.evaluations() + 1);
         Ok(self.energy.into_lattice(&x))
