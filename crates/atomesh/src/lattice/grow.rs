@@ -317,7 +317,7 @@ impl<const D: usize> Growth<'_, D> {
     ) -> Result<(), LatticeError> {
         let mut at = first;
         while at < self.lattice.len() {
-            if at % 4096 == 0 {
+            if at.is_multiple_of(4096) {
                 let done = (self.lattice.len() as f64 / self.expected.max(1.0)).min(1.0);
                 check(watch, Phase::Grow, done, None)?;
             }
