@@ -20,3 +20,13 @@ pub mod lattice;
 pub mod optimize;
 pub mod measure;
 pub mod pipeline;
+
+/// Compiles and runs the code in the README.
+#[cfg(doctest)]
+#[doc = include_str!("../../../README.md")]
+struct Readme;
+
+/// Compiles and runs the code in `docs/method.md`.
+#[cfg(doctest)]
+#[doc = include_str!("../../../docs/method.md")]
+struct MethodDocument;
