@@ -60,9 +60,6 @@ macro_rules! number {
 }
 number!(i8, u8, i16, u16, i32, u32, i64, u64, f32, f64);
 
-/// Appends the items of a range.
-type Fill<'a> = dyn Fn(Range<usize>, &mut Vec<u8>) + Sync + 'a;
-
 /// An array of equal items that can be made from any index on.
 pub(super) struct Column<'a> {
     count: usize,

@@ -101,7 +101,6 @@ macro_rules! with_type {
 
 impl Array<'_> {
     /// Exactly `count` numbers as reals.
-    #[expect(clippy::unnecessary_cast, reason = "one of the types is the target's own")]
     pub fn reals(&self, count: usize) -> Result<Vec<f64>, MeshReadError> {
         if let Place::Text(at) = self.place {
             return self.parse(at, count);
@@ -110,7 +109,6 @@ impl Array<'_> {
     }
 
     /// Exactly `count` numbers as indices.
-    #[expect(clippy::unnecessary_cast, reason = "one of the types is the target's own")]
     pub fn indices(&self, count: usize) -> Result<Vec<u32>, MeshReadError> {
         if let Place::Text(at) = self.place {
             return self.parse(at, count);
