@@ -1,1 +1,98 @@
-fn main() {}
+//! The command `atomesh`: from an image to a mesh that follows it.
+//!
+//! Arguments in, text out: each command reads files, calls the core, and writes files that appear
+//! whole or not at all. Standard output carries what was asked for; progress, warnings, summaries and
+//! errors go to standard error. Exit codes: 0; 1 for content, memory or output; 2 for options; 130
+//! after Ctrl-C.
+
+mod commands;
+mod dimension;
+mod failure;
+mod frame_options;
+mod memory;
+mod outputs;
+mod progress;
+mod run_config;
+mod section;
+mod values;
+
+use std::io::Write;
+use std::process::ExitCode;
+
+use clap::{Parser, Subcommand};
+
+use failure::Failure;
+use progress::{Progress, Verbosity, catch_interrupts};
+
+/// Meshes aligned with images.
+#[derive(Debug, Parser)]
+#[command(name = "atomesh", version, arg_required_else_help = true, max_term_width = 100)]
+struct Cli {
+    #[command(subcommand)]
+    command: Command,
+    /// Print nothing but errors
+    #[arg(short, long, global = true, conflicts_with = "verbose", help_heading = "Run")]
+    quiet: bool,
+    /// Print a line for every phase, with its time
+    #[arg(short, long, global = true, help_heading = "Run")]
+    verbose: bool,
+    /// Threads to use; the result is the same with any number. Default: one a core
+    #[arg(long, global = true, value_name = "COUNT", help_heading = "Run",
+        value_parser = clap::value_parser!(u16).range(1..=1024))]
+    threads: Option<u16>,
+}
+
+#[derive(Debug, Subcommand)]
+enum Command {
+    Mesh(Box<commands::mesh::MeshArgs>),
+}
+
+impl Cli {
+    fn verbosity(&self) -> Verbosity {
+        match (self.quiet, self.verbose) {
+            (true, _) => Verbosity::Quiet,
+            (_, true) => Verbosity::Verbose,
+            _ => Verbosity::Normal,
+        }
+    }
+
+    fn run(self) -> Result<String, Failure> {
+        let mut watch = Progress::new(self.verbosity());
+        let result = match self.command {
+            Command::Mesh(args) => commands::mesh::run(*args, &mut watch),
+        };
+        watch.finish();
+        result
+    }
+}
+
+fn main() -> ExitCode {
+    std::panic::set_hook(Box::new(|info| {
+        eprintln!("error: {info}\nadvice: this is a bug in atomesh; please report it");
+    }));
+    let cli = Cli::parse();
+    catch_interrupts();
+    let threads = cli.threads.map_or(0, usize::from);
+    // 0 lets rayon choose; it fails only if it was built before
+    let _ = rayon::ThreadPoolBuilder::new().num_threads(threads).build_global();
+    match std::panic::catch_unwind(|| cli.run()) {
+        Ok(Ok(text)) => print(&text),
+        Ok(Err(failure)) => {
+            eprintln!("{failure}");
+            ExitCode::from(failure.code())
+        }
+        Err(_) => ExitCode::FAILURE,
+    }
+}
+
+/// Prints on standard output; a reader that goes away early is no error.
+fn print(text: &str) -> ExitCode {
+    let mut out = std::io::stdout().lock();
+    match out.write_all(text.as_bytes()).and_then(|()| out.flush()) {
+        Err(e) if e.kind() != std::io::ErrorKind::BrokenPipe => {
+            eprintln!("error: standard output cannot be written: {e}");
+            ExitCode::FAILURE
+        }
+        _ => ExitCode::SUCCESS,
+    }
+}

@@ -1,0 +1,361 @@
+//! `atomesh mesh`: from an image to a mesh that follows it.
+
+use std::path::{Path, PathBuf};
+
+use atomesh::distance::DistanceError;
+use atomesh::enhance::EnhanceError;
+use atomesh::image::Image;
+use atomesh::lattice::LatticeError;
+use atomesh::measure::{ShapeReport, shape};
+use atomesh::optimize::OptimizeError;
+use atomesh::pipeline::{Inputs, MeshReport, Outcome, PipelineError, Prepared, prepare};
+use atomesh::potential::PotentialError;
+use atomesh::watch::Watch;
+use atomesh_io::image::AnyImage;
+use serde_json::json;
+
+use crate::dimension::Dimension;
+use crate::failure::Failure;
+use crate::frame_options;
+use crate::memory;
+use crate::outputs::{Outputs, write_bytes};
+use crate::progress::{Progress, Verbosity};
+use crate::run_config::RunConfig;
+
+/// Turn an image into a mesh that follows it
+///
+/// The image becomes a potential that attracts atoms, -1 in features and 0 elsewhere. Atoms fill the
+/// box of the image about a nominal distance apart, move to lower their energy, and are connected by
+/// Delaunay's rule: triangles from a flat image, tetrahedra from a volume.
+///
+/// Lengths are in lattice units, which are the world units of the image's frame (millimetres,
+/// metres), or samples with --units samples. Places are in world coordinates.
+#[derive(Debug, clap::Args)]
+#[command(after_help = EXAMPLES)]
+pub struct MeshArgs {
+    #[command(flatten)]
+    run: RunConfig,
+    /// Take options from a file that --write-config wrote; the command line goes before it
+    #[arg(long, value_name = "TOML", help_heading = "Run")]
+    config: Option<PathBuf>,
+    /// Write all options, defaults too, to a file for --config
+    #[arg(long, value_name = "TOML", help_heading = "Run")]
+    write_config: Option<PathBuf>,
+    /// Say how many atoms, and how much memory and time the mesh would take; write nothing
+    #[arg(long, help_heading = "Run")]
+    dry_run: bool,
+}
+
+const EXAMPLES: &str = "\
+Examples:
+  Follow the dark faults of a seismic slice, edges 8 samples long:
+    atomesh mesh faults.png -o faults.vtu --size 8 --picture faults-mesh.png
+  Follow the outlines in a brain scan, edges 6 mm long:
+    atomesh mesh t1.nii.gz -o brain.vtu --features edges --size 6
+  Edges of 6 at features and 18 elsewhere, and keep the run:
+    atomesh mesh faults.png -o faults.msh --size 6..18 --write-config run.toml
+  Run it again with another seed:
+    atomesh mesh --config run.toml --seed 1 -o other.msh
+  Raw samples with wells as fixed atoms:
+    atomesh mesh cube.raw -o cube.vtu --shape 300,200,100 --dtype float32 \\
+      --spacing 25,25,4 --seed-point 2500,1000,200 --seed-point 5000,4000,200";
+
+/// Runs the command; the text is for standard output.
+///
+/// # Errors
+/// [`Failure`] if options make no sense, a file cannot be used, or the user ends the work.
+pub fn run(args: MeshArgs, watch: &mut Progress) -> Result<String, Failure> {
+    let mut run = args.run;
+    if let Some(path) = &args.config {
+        let text = std::fs::read_to_string(path)
+            .map_err(|e| Failure::content(format!("cannot be read: {e}")).about(path))?;
+        run = run.or(RunConfig::parse(&text).map_err(|f| f.about(path))?);
+    }
+    run.check()?;
+    let outputs = if args.dry_run { None } else { Some(Outputs::new(&run.output)?) };
+    if let Some(outputs) = &outputs {
+        outputs.check(&run.input, args.write_config.as_deref())?;
+    }
+    let shown = shown_path(&run)?.to_path_buf();
+    let image = frame_options::read(&shown, run.frame.raw_layout()?, watch)?;
+    let job = Job { run: &run, path: &shown, outputs, write_config: args.write_config.as_deref() };
+    match image {
+        AnyImage::Flat(image) => job.run(image, &Dimension::flat(), watch),
+        AnyImage::Volume(image) => job.run(image, &Dimension::volume(), watch),
+    }
+}
+
+/// The image that gives the frame: the potential where there is no other.
+fn shown_path(run: &RunConfig) -> Result<&Path, Failure> {
+    match run.input.image.as_deref().or(run.input.potential.as_deref()) {
+        Some(path) => Ok(path),
+        None => Err(Failure::misuse("nothing to mesh; expected IMAGE, or --potential FILE")),
+    }
+}
+
+/// A run whose options are known.
+struct Job<'a> {
+    run: &'a RunConfig,
+    path: &'a Path,
+    /// `None`: say what the run would take.
+    outputs: Option<Outputs>,
+    write_config: Option<&'a Path>,
+}
+
+impl Job<'_> {
+    fn run<const D: usize>(
+        &self,
+        image: Image<D>,
+        dimension: &Dimension<D>,
+        watch: &mut Progress,
+    ) -> Result<String, Failure> {
+        let image = self.run.frame.place(image).map_err(|f| f.about(self.path))?;
+        let (prepared, image) = self.prepare(image, dimension, watch)?;
+        for warning in prepared.warnings() {
+            watch.say(&format!("warning: {}: {warning}", self.path.display()));
+        }
+        let Some(outputs) = &self.outputs else {
+            return Ok(expectation(&prepared, dimension));
+        };
+        let outcome = prepared.run(watch).map_err(|e| self.failure(e))?;
+        let figures = self.measure(&outcome, outputs.needs_report(), watch)?;
+        let options = self.run.provenance();
+        outputs.write(&outcome, image.as_ref(), options, dimension, watch)?;
+        if let Some(path) = self.write_config {
+            write_bytes(path, self.run.clone().with_defaults().to_toml()?.as_bytes())?;
+        }
+        watch.finish();
+        if let Some(path) = &outputs.report {
+            let text = format!("{:#}\n", self.report(&outcome, &figures, watch));
+            write_bytes(path, text.as_bytes())?;
+        }
+        if let Some(shape) = &figures.shape {
+            watch.say(&summary(&outputs.mesh, shape, dimension, watch));
+        }
+        Ok(String::new())
+    }
+
+    /// b(x), d(x) and β(x); the image too if it is needed again.
+    fn prepare<'m, const D: usize>(
+        &self,
+        image: Image<D>,
+        dimension: &'m Dimension<D>,
+        watch: &mut Progress,
+    ) -> Result<(Prepared<'m, D>, Option<Image<D>>), Failure> {
+        let mut options = self.run.mesh_options::<D>()?;
+        options.memory_limit = memory::available();
+        let needed = 4 * image.samples().len() as u64;
+        if let Some(available) = options.memory_limit.filter(|&available| needed > available) {
+            let (needed, available) = (memory::text(needed), memory::text(available));
+            let message = format!("the potential needs {needed} of memory; {available} are left");
+            let failure = Failure::content(message).about(self.path);
+            return Err(failure.advise("mesh a box of interest by --crop, or resample the image"));
+        }
+        let input = &self.run.input;
+        let mut field = |path: &Option<PathBuf>| {
+            path.as_deref().map(|p| self.read_field(p, dimension, watch)).transpose()
+        };
+        let size_field = field(&input.size_field)?;
+        let weight_field = field(&input.beta_field)?;
+        // without IMAGE, the potential is the image
+        let potential = if input.image.is_some() { field(&input.potential)? } else { None };
+        if let Some(potential) = &potential {
+            let (found, expected) = (potential.frame().shape(), image.frame().shape());
+            if found != expected {
+                let message = format!("has {found:?} samples (x first); expected {expected:?}");
+                let message = format!("{message}, as {}", self.path.display());
+                return Err(Failure::content(message).about(&self.potential_path()));
+            }
+        }
+        let source = match potential {
+            Some(potential) => {
+                Some(potential.with_frame(*image.frame()).map_err(Failure::content)?)
+            }
+            None => None,
+        };
+        let inputs = Inputs {
+            image: source.as_ref().unwrap_or(&image),
+            is_potential: input.potential.is_some(),
+            size_field: size_field.as_ref(),
+            weight_field: weight_field.as_ref(),
+        };
+        let prepared = prepare(&dimension.method, inputs, options, watch);
+        let prepared = prepared.map_err(|e| self.failure(e))?;
+        let needed = self.outputs.as_ref().is_some_and(Outputs::needs_image);
+        Ok((prepared, needed.then_some(image)))
+    }
+
+    /// An image that must have the shape of the first, its box of interest taken.
+    fn read_field<const D: usize>(
+        &self,
+        path: &Path,
+        dimension: &Dimension<D>,
+        watch: &mut dyn Watch,
+    ) -> Result<Image<D>, Failure> {
+        let any = frame_options::read(path, None, watch)?;
+        let found = any.dimension();
+        let Some(field) = (dimension.image)(any) else {
+            let message = format!("has {found} axes; expected {D}, as {}", self.path.display());
+            return Err(Failure::content(message).about(path));
+        };
+        self.run.frame.place(field).map_err(|f| f.about(path))
+    }
+
+    fn potential_path(&self) -> PathBuf {
+        self.run.input.potential.clone().unwrap_or_else(|| self.path.into())
+    }
+
+    fn measure<const D: usize>(
+        &self,
+        outcome: &Outcome<D>,
+        alignment: bool,
+        watch: &mut Progress,
+    ) -> Result<Figures, Failure> {
+        if alignment {
+            let report = outcome.report(watch).map_err(|e| self.failure(e))?;
+            return Ok(Figures { shape: Some(report.shape.clone()), report: Some(report) });
+        }
+        if watch.verbosity() == Verbosity::Quiet {
+            return Ok(Figures::default());
+        }
+        let bounds = outcome.potential().grid().bounds();
+        let shape = shape(outcome.mesh(), Some(&bounds), watch);
+        let shape = shape.map_err(|e| self.failure(PipelineError::Measure(e)))?;
+        Ok(Figures { shape: Some(shape), report: None })
+    }
+
+    /// The report as JSON: the mesh's figures, then the run's.
+    fn report<const D: usize>(
+        &self,
+        outcome: &Outcome<D>,
+        figures: &Figures,
+        watch: &Progress,
+    ) -> serde_json::Value {
+        let frame = outcome.frame();
+        let seconds: serde_json::Map<_, _> = (watch.times().iter())
+            .map(|(phase, time)| (phase.name().to_owned(), json!(time.as_secs_f64())))
+            .collect();
+        let warnings: Vec<_> = outcome.warnings().iter().map(ToString::to_string).collect();
+        let distance = outcome.distance();
+        json!({
+            "version": env!("CARGO_PKG_VERSION"),
+            "image": {
+                "shape": frame.shape().as_slice(),
+                "spacing": frame.spacing().as_slice(),
+                "origin": frame.origin().as_slice(),
+            },
+            "distance": {
+                "least": distance.least(),
+                "mean": distance.mean(),
+                "greatest": distance.greatest(),
+            },
+            "shape": figures.report.as_ref().map(|r| &r.shape),
+            "alignment": figures.report.as_ref().map(|r| &r.alignment),
+            "optimizer": outcome.optimize_report(),
+            "seconds": seconds,
+            "seconds_total": watch.elapsed().as_secs_f64(),
+            "memory_peak_bytes": memory::peak(),
+            "threads": rayon::current_num_threads(),
+            "warnings": warnings,
+            "options": self.run.clone().with_defaults(),
+        })
+    }
+
+    /// What the core refuses, in the user's terms.
+    fn failure(&self, error: PipelineError) -> Failure {
+        let lattice = &self.run.lattice;
+        match &error {
+            e if e.is_cancelled() => Failure::cancelled(),
+            PipelineError::LatticeDimension { .. } => Failure::misuse(error).about(self.path),
+            PipelineError::Lattice(LatticeError::SeedOutside { index, .. }) => {
+                let point = lattice.seed_point.iter().flatten().nth(*index);
+                let point = point.map_or_else(String::new, |p| format!("{:?}", p.0));
+                Failure::misuse(format!("--seed-point {point} lies outside the image"))
+                    .about(self.path)
+                    .advise("places are in world coordinates; atomesh info IMAGE shows the box")
+            }
+            PipelineError::Enhance(EnhanceError::OutOfRange { .. })
+            | PipelineError::Potential(PotentialError::OutOfRange { .. }) => {
+                Failure::content(error).about(&self.potential_path())
+            }
+            PipelineError::Enhance(EnhanceError::NotFinite { .. }) => {
+                Failure::content(error).about(self.path)
+            }
+            PipelineError::Potential(PotentialError::Weight { index: Some(_), .. }) => {
+                field_failure(&error, self.run.input.beta_field.as_deref())
+            }
+            PipelineError::Distance(_) if self.run.input.size_field.is_some() => {
+                field_failure(&error, self.run.input.size_field.as_deref())
+            }
+            PipelineError::Distance(DistanceError::BelowStep { .. }) => Failure::misuse(error)
+                .about(self.path)
+                .advise("choose a greater --size, or resample the image"),
+            PipelineError::Shape { name, .. } => {
+                let path = match *name {
+                    "size field" => self.run.input.size_field.as_deref(),
+                    _ => self.run.input.beta_field.as_deref(),
+                };
+                field_failure(&error, path)
+            }
+            PipelineError::Distance(_)
+            | PipelineError::Potential(PotentialError::Weight { .. })
+            | PipelineError::Enhance(
+                EnhanceError::EdgeScale { .. } | EnhanceError::Smooth { .. },
+            )
+            | PipelineError::Lattice(LatticeError::SpacingFactor { .. })
+            | PipelineError::Optimize(OptimizeError::Option { .. }) => Failure::misuse(error),
+            _ => Failure::content(error).about(self.path),
+        }
+    }
+}
+
+/// The content of a field is wrong.
+fn field_failure(error: &PipelineError, path: Option<&Path>) -> Failure {
+    let failure = Failure::content(error);
+    match path {
+        Some(path) => failure.about(path),
+        None => failure,
+    }
+}
+
+/// What was measured.
+#[derive(Default)]
+struct Figures {
+    shape: Option<ShapeReport>,
+    report: Option<MeshReport>,
+}
+
+fn summary<const D: usize>(
+    path: &Path,
+    shape: &ShapeReport,
+    dimension: &Dimension<D>,
+    watch: &Progress,
+) -> String {
+    format!(
+        "{}: {} points, {} {}; quality mean {:.3}, least {:.3}; least angle {:.1}°; {:.2} s",
+        path.display(),
+        shape.points,
+        shape.cells,
+        dimension.cells,
+        shape.q_mean,
+        shape.q_min,
+        shape.angle_min,
+        watch.elapsed().as_secs_f64(),
+    )
+}
+
+/// Seconds that an atom takes from growth to mesh, for the dimension; a guide, from our own runs.
+const SECONDS_PER_ATOM: [f64; 2] = [5e-5, 2e-4];
+
+fn expectation<const D: usize>(prepared: &Prepared<'_, D>, dimension: &Dimension<D>) -> String {
+    let estimate = prepared.estimate();
+    let seconds = estimate.atoms as f64 * SECONDS_PER_ATOM[D - 2];
+    format!(
+        "atoms  about {}\ncells  about {} {}\nmemory about {} beside the image\ntime   about {:.1} s\n",
+        estimate.atoms,
+        estimate.cells,
+        dimension.cells,
+        memory::text(estimate.memory),
+        seconds.max(0.1),
+    )
+}

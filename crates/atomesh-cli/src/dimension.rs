@@ -1,0 +1,52 @@
+//! What differs between flat images and volumes, as values.
+
+use atomesh::image::Image;
+use atomesh::mesh::Mesh;
+use atomesh::pipeline::Method;
+use atomesh_draw::{DrawError, Picture, Style, draw_flat, draw_slices};
+use atomesh_io::image::AnyImage;
+
+/// How images of `D` axes are meshed and shown.
+pub struct Dimension<const D: usize> {
+    /// How they are meshed.
+    pub method: Method<D>,
+    /// Draws a mesh in sample coordinates over its image.
+    pub draw: fn(&Image<D>, &Mesh<D>, &Style) -> Result<Picture, DrawError>,
+    /// The image if it has `D` axes.
+    pub image: fn(AnyImage) -> Option<Image<D>>,
+    /// What the cells are called, more than one of them.
+    pub cells: &'static str,
+}
+
+impl Dimension<2> {
+    /// Images of two axes.
+    pub fn flat() -> Self {
+        Self {
+            method: Method::flat(),
+            draw: draw_flat,
+            image: |any| match any {
+                AnyImage::Flat(image) => Some(image),
+                AnyImage::Volume(_) => None,
+            },
+            cells: "triangles",
+        }
+    }
+}
+
+impl Dimension<3> {
+    /// Images of three axes; pictures show the three slices through the middle.
+    pub fn volume() -> Self {
+        Self {
+            method: Method::volume(),
+            draw: |image, mesh, style| {
+                let style = Style { atoms: true, ..style.clone() };
+                draw_slices(image, mesh, image.frame().shape().map(|n| n / 2), &style)
+            },
+            image: |any| match any {
+                AnyImage::Volume(image) => Some(image),
+                AnyImage::Flat(_) => None,
+            },
+            cells: "tetrahedra",
+        }
+    }
+}

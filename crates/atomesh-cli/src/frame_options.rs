@@ -1,0 +1,172 @@
+//! Images as options describe them: frame, box of interest, raw layout.
+
+use std::path::Path;
+
+use atomesh::image::{Frame, FrameError, Image};
+use atomesh::watch::Watch;
+use atomesh_io::image::{
+    AnyImage, ByteOrder, RawLayout, ReadError, ReadOptions, ReadReason, SampleType, read_image,
+};
+use serde::{Deserialize, Serialize};
+
+use crate::failure::Failure;
+use crate::memory;
+use crate::section::section;
+use crate::values::{Counts, Numbers, Text, WorldBox, named};
+
+/// Which byte of a number comes first.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(rename_all = "lowercase")]
+pub enum RawOrder {
+    /// The least significant.
+    Little,
+    /// The most significant.
+    Big,
+}
+
+section! {
+    /// Where the samples are, and which of them count.
+    pub struct FrameOptions {
+        /// World units from one sample to the next along x, y (and z), as in 0.5,0.5,2; replaces the
+        /// image's own. Default: the image's, else 1
+        #[arg(long, value_name = "SX,SY[,SZ]", allow_hyphen_values = true)]
+        pub spacing: Numbers,
+        /// World coordinates of the first sample; replaces the image's own. Default: the image's,
+        /// else 0
+        #[arg(long, value_name = "X,Y[,Z]", allow_hyphen_values = true)]
+        pub origin: Numbers,
+        /// World directions of the axes as a matrix, row by row: its columns are the axes x, y (and z).
+        /// Default: the image's, else axes along the world's
+        #[arg(long, value_name = "M11,M12,...", allow_hyphen_values = true)]
+        pub direction: Numbers,
+        /// Box of interest in world coordinates, rounded outward to whole samples
+        #[arg(long, value_name = "X0..X1,Y0..Y1[,Z0..Z1]", allow_hyphen_values = true)]
+        pub crop: Text<WorldBox>,
+        /// Value that takes the place of NaN samples; without it they are an error
+        #[arg(long, value_name = "VALUE", allow_hyphen_values = true)]
+        pub fill: f64,
+        /// Raw samples: their counts along x, y (and z), x fastest in the file. A NumPy array of
+        /// shape (nz, ny, nx) is NX,NY,NZ here
+        #[arg(long, value_name = "NX,NY[,NZ]")]
+        pub shape: Counts,
+        /// Raw samples: their type by NumPy's name: uint8, int16, float32 ...
+        #[arg(long, value_name = "TYPE")]
+        pub dtype: Text<SampleType>,
+        /// Raw samples: which byte comes first. Default: little
+        #[arg(long, value_name = "ORDER",
+            value_parser = named::<RawOrder>(&["little", "big"]))]
+        pub byte_order: RawOrder,
+        /// Raw samples: bytes before the first. Default: 0
+        #[arg(long, value_name = "BYTES")]
+        pub offset: u64,
+    }
+}
+
+/// What the command line calls the options of a frame.
+const OPTIONS: [&str; 4] = ["--spacing", "--origin", "--direction", "--crop"];
+
+impl FrameOptions {
+    /// The layout of raw samples, if one is given.
+    pub fn raw_layout(&self) -> Result<Option<RawLayout>, Failure> {
+        let (shape, sample_type) = match (&self.shape, self.dtype) {
+            (None, None) => return Ok(None),
+            (Some(shape), Some(Text(sample_type))) => (shape.0.clone(), sample_type),
+            _ => return Err(Failure::misuse("raw samples need both a shape and a dtype")),
+        };
+        if !(2..=3).contains(&shape.len()) {
+            let count = shape.len();
+            return Err(Failure::misuse(format!("--shape has {count} axes; expected 2 or 3")));
+        }
+        let byte_order = match self.byte_order {
+            Some(RawOrder::Big) => ByteOrder::Big,
+            Some(RawOrder::Little) | None => ByteOrder::Little,
+        };
+        Ok(Some(RawLayout { shape, sample_type, byte_order, offset: self.offset.unwrap_or(0) }))
+    }
+
+    /// The frame with what the options override.
+    pub fn apply<const D: usize>(&self, mut frame: Frame<D>) -> Result<Frame<D>, Failure> {
+        let misuse = |e: FrameError| Failure::misuse(e);
+        if let Some(spacing) = &self.spacing {
+            frame = frame.with_spacing(axes(OPTIONS[0], &spacing.0)?).map_err(misuse)?;
+        }
+        if let Some(origin) = &self.origin {
+            frame = frame.with_origin(axes(OPTIONS[1], &origin.0)?).map_err(misuse)?;
+        }
+        if let Some(Numbers(direction)) = &self.direction {
+            if direction.len() != D * D {
+                return Err(wrong_count(OPTIONS[2], direction.len(), D * D, D));
+            }
+            let rows = std::array::from_fn(|r| std::array::from_fn(|c| direction[r * D + c]));
+            frame = frame.with_direction(rows).map_err(misuse)?;
+        }
+        Ok(frame)
+    }
+
+    /// The image in the frame of the options, cropped, without NaN.
+    pub fn place<const D: usize>(&self, image: Image<D>) -> Result<Image<D>, Failure> {
+        let frame = self.apply(*image.frame())?;
+        let mut image = image.with_frame(frame).map_err(Failure::content)?;
+        if let Some(Text(crop)) = &self.crop {
+            let (start, end) = crop.samples(&frame).map_err(Failure::misuse)?;
+            image = image.crop(start, end).map_err(Failure::misuse)?;
+        }
+        let range = image.samples().range();
+        if range.nan_count == 0 {
+            return Ok(image);
+        }
+        let Some(fill) = self.fill else {
+            let (nan, all) = (range.nan_count, image.samples().len());
+            let message = format!("{nan} of {all} samples are NaN; expected numbers");
+            return Err(
+                Failure::content(message).advise("--fill VALUE puts a number in their place")
+            );
+        };
+        let (frame, mut samples) = image.into_parts();
+        samples.fill_nan(fill);
+        Image::new(frame, samples).map_err(Failure::content)
+    }
+}
+
+/// One number for each axis.
+pub fn axes<const D: usize>(option: &str, numbers: &[f64]) -> Result<[f64; D], Failure> {
+    numbers.try_into().map_err(|_| wrong_count(option, numbers.len(), D, D))
+}
+
+fn wrong_count(option: &str, found: usize, expected: usize, dimension: usize) -> Failure {
+    Failure::misuse(format!(
+        "{option} has {found} numbers; expected {expected} for a {dimension}-D image"
+    ))
+}
+
+/// Reads an image, unless its file alone is larger than the memory there is.
+pub fn read(
+    path: &Path,
+    raw: Option<RawLayout>,
+    watch: &mut dyn Watch,
+) -> Result<AnyImage, Failure> {
+    let bytes = path.metadata().map_or(0, |m| m.len());
+    if let Some(available) = memory::available()
+        && bytes > available
+    {
+        let (bytes, available) = (memory::text(bytes), memory::text(available));
+        let message = format!("holds {bytes}; expected less than the {available} of memory left");
+        let failure = Failure::content(message).about(path);
+        return Err(failure.advise("crop or resample the image first"));
+    }
+    read_image(path, &ReadOptions { raw }, watch).map_err(|ReadError { path, reason, .. }| {
+        match reason {
+            ReadReason::Cancelled(_) => Failure::cancelled(),
+            ReadReason::UnknownExtension { .. } => Failure::misuse(&reason)
+                .about(&path)
+                .advise("rename the file, or describe raw samples by --shape and --dtype"),
+            ReadReason::NoRawLayout => Failure::misuse("raw samples say neither shape nor type")
+                .about(&path)
+                .advise("give --shape NX,NY[,NZ] and --dtype TYPE"),
+            ReadReason::RawSize { .. } | ReadReason::RawShape { .. } => {
+                Failure::misuse(&reason).about(&path)
+            }
+            _ => Failure::content(&reason).about(&path),
+        }
+    })
+}

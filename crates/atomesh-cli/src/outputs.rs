@@ -1,0 +1,207 @@
+//! The files that a run writes: refused before the work if they cannot be, written after it.
+
+use std::io::Write;
+use std::path::{Path, PathBuf};
+
+use atomesh::image::{Image, Samples};
+use atomesh::pipeline::Outcome;
+use atomesh::watch::{Phase, Watch};
+use atomesh_draw::{PictureFormat, Style};
+use atomesh_io::atomic_file::AtomicFile;
+use atomesh_io::image::{ImageFormat, WriteReason, write_image};
+use atomesh_io::mesh::msh::MshVersion;
+use atomesh_io::mesh::{MeshData, MeshFormat, MeshWriteError, Provenance, write_mesh_as};
+
+use crate::dimension::Dimension;
+use crate::failure::Failure;
+use crate::progress::Progress;
+use crate::run_config::{InputOptions, OutputOptions};
+
+/// Where everything goes, in formats that are known.
+#[derive(Clone, Debug)]
+pub struct Outputs {
+    /// The mesh.
+    pub mesh: PathBuf,
+    mesh_format: MeshFormat,
+    picture: Option<(PathBuf, PictureFormat)>,
+    /// The report.
+    pub report: Option<PathBuf>,
+    potential: Option<PathBuf>,
+}
+
+impl Outputs {
+    /// The files of a run.
+    ///
+    /// # Errors
+    /// [`Failure`] if the mesh is missing or an ending unknown.
+    pub fn new(options: &OutputOptions) -> Result<Self, Failure> {
+        let Some(mesh) = options.output.clone() else {
+            return Err(Failure::misuse("no mesh to write; expected -o MESH, as in -o mesh.vtu"));
+        };
+        let mut mesh_format =
+            MeshFormat::of(&mesh).map_err(|_| unknown_ending(&mesh, MeshFormat::EXTENSIONS))?;
+        if let Some(version) = &options.msh {
+            let MeshFormat::Msh(_, encoding) = mesh_format else {
+                return Err(Failure::misuse("--msh is for .msh files").about(&mesh));
+            };
+            mesh_format = MeshFormat::Msh(msh_version(version)?, encoding);
+        }
+        let picture = match &options.picture {
+            Some(path) => {
+                let format = PictureFormat::of(path);
+                let format = format.map_err(|_| unknown_ending(path, ".png, .svg"))?;
+                Some((path.clone(), format))
+            }
+            None => None,
+        };
+        let potential = options.write_potential.clone();
+        if let Some(path) = &potential {
+            check_potential(path)?;
+        }
+        Ok(Self { mesh, mesh_format, picture, report: options.report.clone(), potential })
+    }
+
+    /// Whether the image is still needed after the atoms have felt it.
+    pub fn needs_image(&self) -> bool {
+        self.picture.is_some()
+    }
+
+    /// Whether the mesh is to be measured against the features.
+    pub fn needs_report(&self) -> bool {
+        self.report.is_some()
+    }
+
+    fn paths(&self) -> impl Iterator<Item = &Path> {
+        let picture = self.picture.as_ref().map(|(path, _)| path);
+        let others = [picture, self.report.as_ref(), self.potential.as_ref()];
+        [Some(&self.mesh)].into_iter().chain(others).flatten().map(PathBuf::as_path)
+    }
+
+    /// Tries whether every file can be written, and would not take the place of another or of an
+    /// input.
+    ///
+    /// # Errors
+    /// [`Failure`] names the first that does not.
+    pub fn check(&self, input: &InputOptions, config: Option<&Path>) -> Result<(), Failure> {
+        let inputs = [&input.image, &input.potential, &input.size_field, &input.beta_field];
+        let inputs = inputs.into_iter().flatten().map(PathBuf::as_path);
+        let mut taken: Vec<PathBuf> = inputs.filter_map(|p| p.canonicalize().ok()).collect();
+        for path in self.paths().chain(config) {
+            check_writable(path)?;
+            let name = absolute(path);
+            if taken.contains(&name) {
+                let message = "would be written over another file of this run";
+                return Err(Failure::misuse(message).about(path));
+            }
+            taken.push(name);
+        }
+        Ok(())
+    }
+
+    /// Writes mesh, potential and picture.
+    ///
+    /// # Errors
+    /// [`Failure`] if a file cannot be written, or the user ends the work.
+    pub fn write<const D: usize>(
+        &self,
+        outcome: &Outcome<D>,
+        image: Option<&Image<D>>,
+        options: serde_json::Value,
+        dimension: &Dimension<D>,
+        watch: &mut Progress,
+    ) -> Result<(), Failure> {
+        if let (Some((path, format)), Some(image)) = (&self.picture, image) {
+            watch.begin(Phase::Draw);
+            let style = Style { units: outcome.units(), ..Style::default() };
+            let picture = (dimension.draw)(image, &outcome.sample_mesh(), &style);
+            let bytes = picture.and_then(|p| p.encode(*format)).map_err(Failure::content)?;
+            write_bytes(path, &bytes)?;
+        }
+        let _ = watch.step(Phase::Write, 0.0, None);
+        if let Some(path) = &self.potential {
+            write_potential(path, outcome, watch)?;
+        }
+        let seed = options["optimize"]["seed"].as_u64().unwrap_or(0);
+        let provenance = Provenance { version: env!("CARGO_PKG_VERSION").into(), options, seed };
+        let mesh = outcome.world_mesh();
+        let data = MeshData::new(&mesh).with_frame(outcome.frame()).with_provenance(&provenance);
+        let data = data
+            .with_point_field("distance", outcome.distance_at_points())
+            .and_then(|data| data.with_point_field("potential", outcome.potential_at_points()))
+            .map_err(Failure::content)?;
+        write_mesh_as(&self.mesh, self.mesh_format, &data, watch).map_err(|e| match e {
+            MeshWriteError::Cancelled(_) => Failure::cancelled(),
+            _ => Failure::content(e).about(&self.mesh),
+        })
+    }
+}
+
+fn msh_version(text: &str) -> Result<MshVersion, Failure> {
+    match text {
+        "4.1" => Ok(MshVersion::V41),
+        "2.2" => Ok(MshVersion::V22),
+        _ => Err(Failure::misuse(format!("msh version {text:?}; expected 4.1 or 2.2"))),
+    }
+}
+
+fn unknown_ending(path: &Path, known: &str) -> Failure {
+    Failure::misuse(format!("the ending says no format; expected one of {known}")).about(path)
+}
+
+/// The formats that hold single precision.
+fn check_potential(path: &Path) -> Result<(), Failure> {
+    use ImageFormat::{Nifti, NiftiGz, Npy, Raw, Tiff};
+    match ImageFormat::from_path(path) {
+        Some(Npy | Nifti | NiftiGz | Tiff | Raw) => Ok(()),
+        _ => Err(unknown_ending(path, ".npy, .nii, .nii.gz, .tif, .raw")),
+    }
+}
+
+/// Tries whether a file could be written.
+pub fn check_writable(path: &Path) -> Result<(), Failure> {
+    AtomicFile::create(path).map(drop).map_err(|e| cannot_write(path, &e))
+}
+
+/// Writes a file, whole or not at all.
+pub fn write_bytes(path: &Path, bytes: &[u8]) -> Result<(), Failure> {
+    let write = || {
+        let mut file = AtomicFile::create(path)?;
+        file.write_all(bytes)?;
+        file.commit()
+    };
+    write().map_err(|e| cannot_write(path, &e))
+}
+
+fn cannot_write(path: &Path, error: &std::io::Error) -> Failure {
+    let failure = Failure::content(format!("cannot be written: {error}")).about(path);
+    match error.kind() {
+        std::io::ErrorKind::NotFound => failure.advise("make its folder first"),
+        _ => failure,
+    }
+}
+
+fn write_potential<const D: usize>(
+    path: &Path,
+    outcome: &Outcome<D>,
+    watch: &mut Progress,
+) -> Result<(), Failure> {
+    let samples = Samples::F32(outcome.potential().samples().to_vec());
+    let image = Image::new(*outcome.frame(), samples).map_err(Failure::content)?;
+    write_image(path, &image, watch).map_err(|e| match e.reason {
+        WriteReason::Cancelled(_) => Failure::cancelled(),
+        _ => Failure::content(e),
+    })
+}
+
+/// The path as other spellings of it would be too.
+fn absolute(path: &Path) -> PathBuf {
+    let folder = match path.parent() {
+        Some(folder) if !folder.as_os_str().is_empty() => folder,
+        _ => Path::new("."),
+    };
+    let whole = path.canonicalize().ok();
+    whole.unwrap_or_else(|| {
+        let folder = folder.canonicalize().unwrap_or_else(|_| folder.into());
+        folder.join(path.file_name().unwrap_or_default())
+    })
+}

@@ -1,0 +1,331 @@
+//! Everything that decides a run of `atomesh mesh`, from the command line or a configuration.
+
+use std::path::PathBuf;
+
+use atomesh::enhance::{EdgeOperator, FeatureOptions, Features};
+use atomesh::image::Units;
+use atomesh::optimize::{EngineKind, OptimizeOptions};
+use atomesh::pipeline::{LatticeKind, MeshOptions, Size};
+use atomesh::potential::Interpolation;
+use serde::{Deserialize, Serialize};
+
+use crate::failure::Failure;
+use crate::frame_options::{FrameOptions, axes};
+use crate::section::section;
+use crate::values::{Numbers, SizeValue, named, number_in};
+
+section! {
+    /// The files that a mesh is made from.
+    pub struct InputOptions {
+        /// Image to mesh: .png .jpg .pgm .tif .npy .nii .nii.gz, or raw samples with --shape and
+        /// --dtype. Two axes make triangles, three make tetrahedra
+        #[arg(value_name = "IMAGE")]
+        pub image: PathBuf,
+        /// Image potential b(x) to use as it is, values in -1 (attracts) to 1 (repels), instead of
+        /// the features of IMAGE. With both, IMAGE gives the frame and the picture
+        #[arg(long, value_name = "FILE")]
+        pub potential: PathBuf,
+        /// Nominal distance d(x) in lattice units, an image of the same shape; goes before --size
+        #[arg(long, value_name = "FILE", conflicts_with = "size")]
+        pub size_field: PathBuf,
+        /// Weight β(x), 0 to 1, an image of the same shape; goes before --beta
+        #[arg(long, value_name = "FILE", conflicts_with = "beta")]
+        pub beta_field: PathBuf,
+    }
+}
+
+section! {
+    /// How the image becomes a potential.
+    pub struct PotentialOptions {
+        /// What attracts atoms: dark or bright places, edges, or nothing. Default: dark
+        #[arg(long, value_name = "KIND",
+            value_parser = named::<Features>(&["dark", "bright", "edges", "none"]))]
+        pub features: Features,
+        /// How edges are found: derivatives of a Gaussian, or the paper's Prewitt differences.
+        /// Default: gaussian
+        #[arg(long, value_name = "OPERATOR",
+            value_parser = named::<EdgeOperator>(&["gaussian", "prewitt"]))]
+        pub edge_operator: EdgeOperator,
+        /// Standard deviation of the Gaussian edge operator in samples, 0.3 or more. Default: 1.5
+        #[arg(long, value_name = "SIGMA",
+            value_parser = number_in(0.3, 1000.0, "a number of samples from 0.3 to 1000"))]
+        pub edge_scale: f64,
+        /// Push atoms off features, so that they line up alongside. Default: false
+        #[arg(long, value_name = "BOOL", num_args = 0..=1, require_equals = true,
+            default_missing_value = "true")]
+        pub repel: bool,
+        /// Standard deviation in lattice units of a Gaussian over the potential. Default: 0
+        #[arg(long, value_name = "SIGMA",
+            value_parser = number_in(0.0, f64::MAX, "a length of 0 or more"))]
+        pub smooth: f64,
+        /// How the potential is read between samples. Default: linear
+        #[arg(long, value_name = "KIND",
+            value_parser = named::<Interpolation>(&["nearest", "linear", "spline"]))]
+        pub interpolation: Interpolation,
+    }
+}
+
+section! {
+    /// The lattice of atoms.
+    pub struct LatticeOptions {
+        /// Edge length wanted, in lattice units: one, as in 8, or from features to elsewhere, as in
+        /// 6..18. Default: from the size of the image
+        #[arg(long, value_name = "D | MIN..MAX", allow_hyphen_values = true)]
+        pub size: SizeValue,
+        /// Weight β of the image against regularity, 0 to 1. Default: 0.4
+        #[arg(long, value_name = "BETA", allow_hyphen_values = true,
+            value_parser = number_in(0.0, 1.0, "a number from 0 to 1"))]
+        pub beta: f64,
+        /// Lattice units: the frame's own (millimetres, metres ...), or samples, as in the paper.
+        /// Default: physical
+        #[arg(long, value_name = "UNITS", value_parser = named::<Units>(&["physical", "samples"]))]
+        pub units: Units,
+        /// Lattice to start from: hexagonal (2-D); bcc, fcc (3-D); random (both). Default: hexagonal
+        /// or bcc
+        #[arg(long, value_name = "KIND",
+            value_parser = named::<LatticeKind>(&["hexagonal", "bcc", "fcc", "random"]))]
+        pub lattice: LatticeKind,
+        /// Share γ of the edge length that an atom of the starting lattice keeps free, 0.1 to 1.
+        /// Default: 0.8
+        #[arg(long, value_name = "GAMMA",
+            value_parser = number_in(0.1, 1.0, "a number from 0.1 to 1"))]
+        pub spacing_factor: f64,
+        /// Atom that stays where it is, such as a well, in world coordinates; growth starts there.
+        /// May be given many times
+        #[arg(long, value_name = "X,Y[,Z]", allow_hyphen_values = true)]
+        pub seed_point: Vec<Numbers>,
+    }
+}
+
+section! {
+    /// How atoms are moved.
+    pub struct OptimizerOptions {
+        /// What computes the energy: neighbour pairs, or the paper's sums over samples. Default:
+        /// pairs
+        #[arg(long, value_name = "ENGINE",
+            value_parser = named::<EngineKind>(&["pairs", "sampled"]))]
+        pub engine: EngineKind,
+        /// Stages on a smoothed potential before the sharp one. Default: 0
+        #[arg(long, value_name = "COUNT", value_parser = clap::value_parser!(u64).range(0..=10))]
+        pub smoothing_steps: u64,
+        /// Relative decrease ε of the energy at which the work ends. Default: 0.001
+        #[arg(long, value_name = "EPSILON",
+            value_parser = number_in(0.0, 0.999, "a number from 0 to 0.999"))]
+        pub tolerance: f64,
+        /// Iterations that lower the energy, at most, after each perturbation. Default: 200
+        #[arg(long, value_name = "COUNT", value_parser = clap::value_parser!(u64).range(1..=1_000_000))]
+        pub inner_limit: u64,
+        /// Perturbations, at most. Default: 10
+        #[arg(long, value_name = "COUNT", value_parser = clap::value_parser!(u64).range(0..=1_000_000))]
+        pub outer_limit: u64,
+        /// How far a perturbation moves an atom, over its edge length, below 0.5. Default: 0.1
+        #[arg(long, value_name = "SHARE",
+            value_parser = number_in(0.0, 0.499, "a number from 0 to 0.499"))]
+        pub perturbation: f64,
+        /// Seed of all random numbers. Default: 0
+        #[arg(long, value_name = "SEED",
+            value_parser = clap::value_parser!(u64).range(..=i64::MAX as u64))]
+        pub seed: u64,
+    }
+}
+
+section! {
+    /// The files that are written.
+    pub struct OutputOptions {
+        /// Mesh to write: .vtu .vtk .msh (Gmsh 4.1) .msh2 (Gmsh 2.2) .npz. Coordinates are the
+        /// image's world coordinates
+        #[arg(short, long, value_name = "MESH")]
+        pub output: PathBuf,
+        /// Version of Gmsh's format in a .msh file. Default: 4.1
+        #[arg(long, value_name = "VERSION", value_parser = ["4.1", "2.2"])]
+        pub msh: String,
+        /// Picture of the mesh over the image, .png or .svg; in 3-D of the three slices through the
+        /// middle
+        #[arg(long, value_name = "PICTURE")]
+        pub picture: PathBuf,
+        /// Figures of the mesh (shape, alignment) and of the run, as JSON
+        #[arg(long, value_name = "JSON")]
+        pub report: PathBuf,
+        /// Potential that the atoms felt: .npy (axes z, y, x), .nii, .nii.gz, .tif or .raw, float32
+        #[arg(long, value_name = "FILE")]
+        pub write_potential: PathBuf,
+    }
+}
+
+/// Everything that decides a run: five tables of options with the command line's names.
+#[derive(Clone, Debug, Default, PartialEq, clap::Args, Serialize, Deserialize)]
+#[serde(default, deny_unknown_fields, rename_all = "kebab-case")]
+pub struct RunConfig {
+    /// Files read.
+    #[command(flatten, next_help_heading = "Input")]
+    #[serde(skip_serializing_if = "InputOptions::is_empty")]
+    pub input: InputOptions,
+    /// Files written.
+    #[command(flatten, next_help_heading = "Output")]
+    #[serde(skip_serializing_if = "OutputOptions::is_empty")]
+    pub output: OutputOptions,
+    /// Lattice.
+    #[command(flatten, next_help_heading = "Lattice")]
+    #[serde(skip_serializing_if = "LatticeOptions::is_empty")]
+    pub lattice: LatticeOptions,
+    /// Potential.
+    #[command(flatten, next_help_heading = "Features")]
+    #[serde(skip_serializing_if = "PotentialOptions::is_empty")]
+    pub features: PotentialOptions,
+    /// Frame.
+    #[command(flatten, next_help_heading = "Frame")]
+    #[serde(skip_serializing_if = "FrameOptions::is_empty")]
+    pub frame: FrameOptions,
+    /// Optimizer.
+    #[command(flatten, next_help_heading = "Optimisation")]
+    #[serde(skip_serializing_if = "OptimizerOptions::is_empty")]
+    pub optimize: OptimizerOptions,
+}
+
+impl RunConfig {
+    /// Reads a configuration.
+    ///
+    /// # Errors
+    /// [`Failure`] with the line if a key is unknown or a value is of the wrong kind.
+    pub fn parse(text: &str) -> Result<Self, Failure> {
+        toml::from_str(text).map_err(|e| {
+            let line = e.span().map_or(1, |s| text[..s.start].matches('\n').count() + 1);
+            Failure::misuse(format!("line {line}: {}", e.message().replace('\n', "; ")))
+        })
+    }
+
+    /// The text of a configuration that gives the same run.
+    pub fn to_toml(&self) -> Result<String, Failure> {
+        toml::to_string(self).map_err(Failure::content)
+    }
+
+    /// Takes from `other` what was not given.
+    pub fn or(self, other: Self) -> Self {
+        // a size given as one thing replaces the other
+        let mut below = other;
+        if self.lattice.size.is_some() {
+            below.input.size_field = None;
+        }
+        if self.input.size_field.is_some() {
+            below.lattice.size = None;
+        }
+        if self.lattice.beta.is_some() {
+            below.input.beta_field = None;
+        }
+        if self.input.beta_field.is_some() {
+            below.lattice.beta = None;
+        }
+        Self {
+            input: self.input.or(below.input),
+            output: self.output.or(below.output),
+            lattice: self.lattice.or(below.lattice),
+            features: self.features.or(below.features),
+            frame: self.frame.or(below.frame),
+            optimize: self.optimize.or(below.optimize),
+        }
+    }
+
+    /// The same with every default that does not depend on the image spelt out, so that the run
+    /// stays the same when defaults change.
+    pub fn with_defaults(self) -> Self {
+        let (mesh, features) = (MeshOptions::<2>::default(), FeatureOptions::default());
+        let moves = OptimizeOptions::default();
+        let mut defaults = Self {
+            lattice: LatticeOptions {
+                beta: Some(mesh.image_weight),
+                units: Some(mesh.units),
+                spacing_factor: Some(mesh.spacing_factor),
+                ..Default::default()
+            },
+            features: PotentialOptions {
+                features: Some(features.features),
+                edge_operator: Some(features.edge_operator),
+                edge_scale: Some(features.edge_scale),
+                repel: Some(features.repel),
+                smooth: Some(features.smooth),
+                interpolation: Some(mesh.interpolation),
+            },
+            optimize: OptimizerOptions {
+                engine: Some(moves.engine),
+                smoothing_steps: Some(moves.smoothing_steps as u64),
+                tolerance: Some(moves.tolerance),
+                inner_limit: Some(moves.inner_limit as u64),
+                outer_limit: Some(moves.outer_limit as u64),
+                perturbation: Some(moves.perturbation),
+                seed: Some(moves.seed),
+            },
+            ..Default::default()
+        };
+        if self.input.potential.is_some() {
+            // the options of features have no part in the run
+            let interpolation = defaults.features.interpolation;
+            defaults.features = PotentialOptions { interpolation, ..Default::default() };
+        }
+        self.or(defaults)
+    }
+
+    /// The options that the core takes.
+    ///
+    /// # Errors
+    /// [`Failure`] if a seed point has another number of coordinates, or a value from a configuration
+    /// is out of its range.
+    pub fn mesh_options<const D: usize>(&self) -> Result<MeshOptions<D>, Failure> {
+        let (lattice, features, moves) = (&self.lattice, &self.features, &self.optimize);
+        let default = MeshOptions::<D>::default();
+        let seeds = lattice.seed_point.iter().flatten();
+        let count = |n: Option<u64>, default: usize| n.map_or(default, |n| n as usize);
+        let optimize = OptimizeOptions {
+            engine: moves.engine.unwrap_or(default.optimize.engine),
+            tolerance: moves.tolerance.unwrap_or(default.optimize.tolerance),
+            inner_limit: count(moves.inner_limit, default.optimize.inner_limit),
+            outer_limit: count(moves.outer_limit, default.optimize.outer_limit),
+            perturbation: moves.perturbation.unwrap_or(default.optimize.perturbation),
+            smoothing_steps: count(moves.smoothing_steps, default.optimize.smoothing_steps),
+            seed: moves.seed.unwrap_or(default.optimize.seed),
+            ..default.optimize
+        };
+        optimize.validate().map_err(Failure::misuse)?;
+        let basis = default.features;
+        Ok(MeshOptions {
+            features: FeatureOptions {
+                features: features.features.unwrap_or(basis.features),
+                edge_operator: features.edge_operator.unwrap_or(basis.edge_operator),
+                edge_scale: features.edge_scale.unwrap_or(basis.edge_scale),
+                smooth: features.smooth.unwrap_or(basis.smooth),
+                repel: features.repel.unwrap_or(basis.repel),
+                ..basis
+            },
+            interpolation: features.interpolation.unwrap_or(default.interpolation),
+            units: lattice.units.unwrap_or(default.units),
+            size: lattice.size.map_or(Size::Default, |s| s.0),
+            image_weight: lattice.beta.unwrap_or(default.image_weight),
+            lattice: lattice.lattice.unwrap_or(default.lattice),
+            spacing_factor: lattice.spacing_factor.unwrap_or(default.spacing_factor),
+            seed_points: seeds.map(|p| axes("--seed-point", &p.0)).collect::<Result<_, _>>()?,
+            optimize,
+            memory_limit: None,
+        })
+    }
+
+    /// Checks what does not need the image.
+    ///
+    /// # Errors
+    /// [`Failure`] names the first option that is out of its range.
+    pub fn check(&self) -> Result<(), Failure> {
+        let seeds = self.lattice.seed_point.iter().flatten();
+        if let Some(odd) = seeds.map(|p| p.0.len()).find(|n| !(2..=3).contains(n)) {
+            let message = format!("--seed-point has {odd} numbers; expected 2 or 3");
+            return Err(Failure::misuse(message));
+        }
+        let without_seeds = LatticeOptions { seed_point: None, ..self.lattice.clone() };
+        Self { lattice: without_seeds, ..self.clone() }.mesh_options::<2>().map(drop)
+    }
+
+    /// What decides the mesh beside the files, for its metadata: no paths.
+    pub fn provenance(&self) -> serde_json::Value {
+        let mut run = self.clone().with_defaults();
+        run.input = InputOptions::default();
+        run.output = OutputOptions::default();
+        serde_json::to_value(run).unwrap_or_default()
+    }
+}
