@@ -227,9 +227,9 @@ impl RunConfig {
 
     /// The same with every default that does not depend on the image spelt out, so that the run
     /// stays the same when defaults change.
-    pub fn with_defaults(self) -> Self {
-        let (mesh, features) = (MeshOptions::<2>::default(), FeatureOptions::default());
-        let moves = OptimizeOptions::default();
+    pub fn with_defaults<const D: usize>(self) -> Self {
+        let (mesh, features) = (MeshOptions::<D>::default(), FeatureOptions::default());
+        let moves = mesh.optimize.clone();
         let mut defaults = Self {
             lattice: LatticeOptions {
                 beta: Some(mesh.image_weight),
@@ -242,7 +242,7 @@ impl RunConfig {
                 edge_operator: Some(features.edge_operator),
                 edge_scale: Some(features.edge_scale),
                 repel: Some(features.repel),
-                smooth: Some(features.smooth),
+                smooth: features.smooth,
                 interpolation: Some(mesh.interpolation),
             },
             optimize: OptimizerOptions {
@@ -291,7 +291,7 @@ impl RunConfig {
                 features: features.features.unwrap_or(basis.features),
                 edge_operator: features.edge_operator.unwrap_or(basis.edge_operator),
                 edge_scale: features.edge_scale.unwrap_or(basis.edge_scale),
-                smooth: features.smooth.unwrap_or(basis.smooth),
+                smooth: features.smooth.or(basis.smooth),
                 repel: features.repel.unwrap_or(basis.repel),
                 ..basis
             },
@@ -322,8 +322,8 @@ impl RunConfig {
     }
 
     /// What decides the mesh beside the files, for its metadata: no paths.
-    pub fn provenance(&self) -> serde_json::Value {
-        let mut run = self.clone().with_defaults();
+    pub fn provenance<const D: usize>(&self) -> serde_json::Value {
+        let mut run = self.clone().with_defaults::<D>();
         run.input = InputOptions::default();
         run.output = OutputOptions::default();
         serde_json::to_value(run).unwrap_or_default()

@@ -119,10 +119,10 @@ impl Job<'_> {
         };
         let outcome = prepared.run(watch).map_err(|e| self.failure(e))?;
         let figures = self.measure(&outcome, outputs.needs_report(), watch)?;
-        let options = self.run.provenance();
+        let options = self.run.provenance::<D>();
         outputs.write(&outcome, image.as_ref(), options, dimension, watch)?;
         if let Some(path) = self.write_config {
-            write_bytes(path, self.run.clone().with_defaults().to_toml()?.as_bytes())?;
+            write_bytes(path, self.run.clone().with_defaults::<D>().to_toml()?.as_bytes())?;
         }
         watch.finish();
         if let Some(path) = &outputs.report {
@@ -257,7 +257,7 @@ impl Job<'_> {
             "memory_peak_bytes": memory::peak(),
             "threads": rayon::current_num_threads(),
             "warnings": warnings,
-            "options": self.run.clone().with_defaults(),
+            "options": self.run.clone().with_defaults::<D>(),
         })
     }
 

@@ -12,7 +12,7 @@ fn run<const D: usize>(image: &Image<D>, options: FeatureOptions) -> Enhanced {
 }
 
 fn with(features: Features) -> FeatureOptions {
-    FeatureOptions { features, ..Default::default() }
+    FeatureOptions { features, smooth: Some(0.0), ..Default::default() }
 }
 
 /// A background of 153 ± 3, a dark line of 10 ± 3 in every 40th column, and one sample of 255.
@@ -32,6 +32,17 @@ fn dark_features_are_at_minus_one_and_the_background_at_zero() {
         let expected = if i % 40 == 20 { -1.0 } else { 0.0 };
         assert!((b - expected).abs() <= 7.0 / 143.0 && (-1.0..=0.0).contains(&b), "{b} at {i}");
     }
+}
+
+#[test]
+fn dark_features_are_rounded_off_unless_sharp_ones_are_asked_for() {
+    let mut grey = vec![200u8; 41 * 41];
+    (0..41).for_each(|y| grey[20 + 41 * y] = 0);
+    let b = run(&image([41, 41], Samples::U8(grey)), FeatureOptions::default()).values;
+    // A line of one sample under the sampled Gaussian of σ = 0.7, cut at 4 σ: its middle weight.
+    let weight = |k: f64| f64::exp(-0.5 * (k / 0.7).powi(2));
+    let middle = 1.0 / (1.0 + 2.0 * (weight(1.0) + weight(2.0) + weight(3.0)));
+    assert!((f64::from(b[20 + 41 * 20]) + middle).abs() < 1e-6, "{} {middle}", b[20 + 41 * 20]);
 }
 
 #[test]
@@ -127,7 +138,7 @@ fn smoothing_is_in_lattice_units() {
     grey[20 * 41 + 20] = 0;
     let frame = Frame::new([41, 41]).unwrap().with_spacing([1.0, 4.0]).unwrap();
     let image = Image::new(frame, Samples::U8(grey)).unwrap();
-    let options = FeatureOptions { smooth: 4.0, ..Default::default() };
+    let options = FeatureOptions { smooth: Some(4.0), ..Default::default() };
     let physical = run(&image, options).values;
     // a distance of 4 units is one row, or four columns
     assert!((physical[21 * 41 + 20] / physical[20 * 41 + 24] - 1.0).abs() < 1e-3);
@@ -163,7 +174,7 @@ fn bad_options_are_refused() {
         assert!(matches!(error, EnhanceError::EdgeScale { .. }));
     }
     for value in [-1.0, f64::NAN, f64::INFINITY] {
-        let options = FeatureOptions { smooth: value, ..Default::default() };
+        let options = FeatureOptions { smooth: Some(value), ..Default::default() };
         let error = enhance(&image, &options, &mut Silent).unwrap_err();
         assert!(matches!(error, EnhanceError::Smooth { .. }));
     }
@@ -202,7 +213,7 @@ fn bits_do_not_depend_on_the_number_of_threads() {
     let image = image([70, 60, 50], Samples::U8(samples));
     let at = |threads| {
         let pool = rayon::ThreadPoolBuilder::new().num_threads(threads).build().unwrap();
-        let options = FeatureOptions { smooth: 1.0, ..with(Features::Edges) };
+        let options = FeatureOptions { smooth: Some(1.0), ..with(Features::Edges) };
         pool.install(|| enhance(&image, &options, &mut Silent).unwrap())
     };
     assert_eq!(at(1), at(3));

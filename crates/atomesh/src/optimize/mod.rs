@@ -31,11 +31,12 @@ use energy::LatticeEnergy;
 pub struct OptimizeOptions {
     /// What computes the energy. Default pairs.
     pub engine: EngineKind,
-    /// ε: both loops end when the energy falls by less than this share. Default 10⁻³, the paper's.
+    /// ε: both loops end when the energy falls by less than this share. Default 10⁻³, the paper's;
+    /// 3·10⁻⁴ in 2-D.
     pub tolerance: f64,
     /// Iterations one inner loop may take. Default 200.
     pub inner_limit: usize,
-    /// Perturbations tried. Default 10.
+    /// Perturbations tried. Default 2: more of them gain a little alignment for as much shape.
     pub outer_limit: usize,
     /// The farthest that a perturbation moves an atom, over its nominal distance. Default 0.1, the paper's.
     pub perturbation: f64,
@@ -56,7 +57,7 @@ impl Default for OptimizeOptions {
             engine: EngineKind::Pairs,
             tolerance: 1e-3,
             inner_limit: 200,
-            outer_limit: 10,
+            outer_limit: 2,
             perturbation: 0.1,
             longest_move: 0.1,
             margin: 0.35,
@@ -94,6 +95,20 @@ pub enum OptimizeError {
 }
 
 impl OptimizeOptions {
+    /// The defaults for images of a dimension.
+    ///
+    /// In 2-D the hexagonal lattice is a stable minimum of the pair potential, and the longer atoms
+    /// search, from a smoothed image to the sharp one, the better the mesh: fault images gain a tenth
+    /// to a third in alignment at equal shape. In 3-D no lattice of that density is: a long search
+    /// lets it fall into disorder, with more alignment but flat cells, so it stops early.
+    pub fn for_dimension(dimension: usize) -> Self {
+        if dimension == 2 {
+            Self { smoothing_steps: 2, tolerance: 3e-4, ..Self::default() }
+        } else {
+            Self::default()
+        }
+    }
+
     /// Checks every option's range.
     ///
     /// # Errors

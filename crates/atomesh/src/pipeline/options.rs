@@ -67,9 +67,8 @@ pub struct MeshOptions<const D: usize> {
     pub units: Units,
     /// The nominal distance.
     pub size: Size,
-    /// β, the weight of the image against regularity, in 0…1; equation (4). Default 0.4: "typically, we
-    /// choose β ≈ 1/2" (Hale 2001); at 0.4 the least shaped cells of our 3-D meshes are markedly better,
-    /// for a tenth less alignment.
+    /// β, the weight of the image against regularity, in 0…1; equation (4). Default 0.5: "typically, we
+    /// choose β ≈ 1/2" (Hale 2001).
     pub image_weight: f64,
     /// The lattice to start from.
     pub lattice: LatticeKind,
@@ -77,7 +76,7 @@ pub struct MeshOptions<const D: usize> {
     pub spacing_factor: f64,
     /// Atoms that stay where they are, in world coordinates: wells. Growth starts there.
     pub seed_points: Vec<Point<D>>,
-    /// How atoms are moved; its seed is the run's.
+    /// How atoms are moved; its seed is the run's. Default [`OptimizeOptions::for_dimension`].
     pub optimize: OptimizeOptions,
     /// Bytes beyond which the work is refused. Default none.
     pub memory_limit: Option<u64>,
@@ -90,11 +89,11 @@ impl<const D: usize> Default for MeshOptions<D> {
             interpolation: Interpolation::default(),
             units: Units::default(),
             size: Size::default(),
-            image_weight: 0.4,
+            image_weight: 0.5,
             lattice: LatticeKind::default(),
             spacing_factor: 0.8,
             seed_points: Vec::new(),
-            optimize: OptimizeOptions::default(),
+            optimize: OptimizeOptions::for_dimension(D),
             memory_limit: None,
         }
     }
