@@ -128,6 +128,7 @@ impl Lbfgs {
 
     fn advance(&mut self, objective: &mut impl Objective) -> Step {
         self.point_downhill();
+        objective.temper(&mut self.direction);
         let first = if self.history.is_empty() {
             let steepest = self.direction.iter().fold(0.0f64, |m, p| m.max(p.abs()));
             if steepest == 0.0 {

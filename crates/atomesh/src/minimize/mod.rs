@@ -25,6 +25,12 @@ pub trait Objective {
         f64::INFINITY
     }
 
+    /// Shortens parts of a direction that are out of proportion, so that they do not hold back the rest.
+    /// Default: none.
+    fn temper(&mut self, direction: &mut [f64]) {
+        let _ = direction;
+    }
+
     /// Moves `x` to the nearest point that is allowed. Default: everything is.
     fn confine(&self, x: &mut [f64]) {
         let _ = x;

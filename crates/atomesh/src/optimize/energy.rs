@@ -165,6 +165,22 @@ impl<E: Engine<D>, const D: usize> Objective for LatticeEnergy<E, D> {
         if self.reach > 0.0 { self.next_move / self.reach } else { f64::INFINITY }
     }
 
+    fn temper(&mut self, direction: &mut [f64]) {
+        let (limit, distances) = (self.next_move, self.engine.distances());
+        direction
+            .as_chunks_mut::<D>()
+            .0
+            .par_iter_mut()
+            .zip(distances)
+            .with_min_len(CHUNK)
+            .for_each(|(p, d)| {
+                let length = p.iter().map(|x| x * x).sum::<f64>().sqrt();
+                if length > limit * d {
+                    p.iter_mut().for_each(|x| *x *= limit * d / length);
+                }
+            });
+    }
+
     fn confine(&self, z: &mut [f64]) {
         let mobility = self.mobility.as_chunks::<D>().0;
         let distances = self.distances();

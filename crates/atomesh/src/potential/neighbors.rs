@@ -1,7 +1,7 @@
 //! Neighbour lists over a graded cell structure.
 //!
 //! Coarse cells are as wide as the longest reach; each is divided on its own, so that a fine cell holds
-//! about two atoms whatever the local density is, and the cost does not grow with d_max/d_min. Atoms are
+//! about one atom whatever the local density is, and the cost does not grow with d_max/d_min. Atoms are
 //! copied in cell order, so that a query reads memory in runs. Lists hold each pair twice, once for
 //! either atom: an atom can then gather its own sum, in the same order at any thread count.
 
@@ -57,23 +57,27 @@ impl NeighborLists {
         self.chunks.par_iter_mut().enumerate().for_each(|(c, chunk)| {
             chunk.starts.clear();
             chunk.neighbors.clear();
+            let mut found: Vec<u32> = Vec::new();
             for i in c * CHUNK..((c + 1) * CHUNK).min(atoms.len()) {
                 chunk.starts.push(chunk.neighbors.len() as u32);
-                let range = reach.range[i];
-                cells.visit(&atoms[i], reach.farthest(i, longest), |order, sorted| {
-                    // Room for the whole span, filled without a branch, then cut to what was found.
-                    let start = chunk.neighbors.len();
-                    chunk.neighbors.resize(start + order.len(), 0);
-                    let found = &mut chunk.neighbors[start..];
-                    let mut count = 0;
+                let (at, range) = (&atoms[i], reach.range[i]);
+                let mut count = 0;
+                cells.visit(at, reach.farthest(i, longest), |order, sorted| {
+                    // Room for the whole run, filled without a branch.
+                    if found.len() < count + order.len() {
+                        found.resize(2 * (count + order.len()), 0);
+                    }
+                    let found = &mut found[count..];
+                    let mut more = 0;
                     for (&j, q) in order.iter().zip(sorted) {
                         let within = 0.5 * (range + q.range);
-                        let near = distance_squared(&q.at, &atoms[i]) < within * within;
-                        found[count] = j;
-                        count += usize::from(near & (j as usize != i));
+                        let near = distance_squared(&q.at, at) < within * within;
+                        found[more] = j;
+                        more += usize::from(near & (j as usize != i));
                     }
-                    chunk.neighbors.truncate(start + count);
+                    count += more;
                 });
+                chunk.neighbors.extend_from_slice(&found[..count]);
             }
             chunk.starts.push(chunk.neighbors.len() as u32);
         });
@@ -90,6 +94,8 @@ impl NeighborLists {
 struct Cells<const D: usize> {
     origin: Point<D>,
     width: f64,
+    /// 1 / width.
+    scale: f64,
     shape: [usize; D],
     /// Per coarse cell: its number of divisions along each axis, and its first fine cell.
     divisions: Vec<u32>,
@@ -120,6 +126,7 @@ impl<const D: usize> Cells<D> {
         let mut cells = Self {
             origin: bounds.min,
             width,
+            scale: 1.0 / width,
             shape,
             divisions: Vec::new(),
             first_fine: Vec::new(),
@@ -133,13 +140,13 @@ impl<const D: usize> Cells<D> {
         cells
     }
 
-    /// Divides each coarse cell so that its fine cells hold about two atoms.
+    /// Divides each coarse cell so that its fine cells hold about one atom.
     fn divide(&mut self, coarse: &[u32]) {
         let mut counts = vec![0u32; self.shape.iter().product()];
         coarse.iter().for_each(|&c| counts[c as usize] += 1);
         self.divisions = counts
             .iter()
-            .map(|&n| (f64::from(n) / 2.0).powf(1.0 / D as f64).round().max(1.0) as u32)
+            .map(|&n| f64::from(n).powf(1.0 / D as f64).round().max(1.0) as u32)
             .collect();
         let mut total = 0u32;
         self.first_fine = self
@@ -181,7 +188,7 @@ impl<const D: usize> Cells<D> {
     fn coarse_of(&self, p: &Point<D>) -> usize {
         let mut index = 0;
         for k in (0..D).rev() {
-            let i = ((p[k] - self.origin[k]) / self.width) as usize;
+            let i = ((p[k] - self.origin[k]) * self.scale) as usize;
             index = index * self.shape[k] + i.min(self.shape[k] - 1);
         }
         index
@@ -190,7 +197,7 @@ impl<const D: usize> Cells<D> {
     /// The fine cell of a coordinate, within its coarse cell `i` along axis k of `m` divisions.
     #[inline]
     fn fine_along(&self, x: f64, k: usize, i: usize, m: u32) -> u32 {
-        let offset = (x - self.origin[k]) / self.width - i as f64;
+        let offset = (x - self.origin[k]) * self.scale - i as f64;
         ((offset * f64::from(m)) as u32).min(m - 1)
     }
 
@@ -213,34 +220,49 @@ impl<const D: usize> Cells<D> {
     fn visit(&self, p: &Point<D>, radius: f64, mut span: impl FnMut(&[u32], &[Sorted<D>])) {
         let (mut low, mut high) = ([0usize; D], [0usize; D]);
         for k in 0..D {
-            low[k] = ((p[k] - radius - self.origin[k]) / self.width).max(0.0) as usize;
-            high[k] = ((p[k] + radius - self.origin[k]) / self.width) as usize;
+            low[k] = ((p[k] - radius - self.origin[k]) * self.scale) as usize; // below 0 counts as 0
+            high[k] = ((p[k] + radius - self.origin[k]) * self.scale) as usize;
             high[k] = high[k].min(self.shape[k] - 1);
             low[k] = low[k].min(high[k]);
         }
+        // a rounding of a cell's side must not cut an atom off
+        let slack = radius * radius * (1.0 + 1e-9);
         for_each_index(&low, &high, |coarse| {
             let mut index = 0;
             for k in (0..D).rev() {
                 index = index * self.shape[k] + coarse[k];
             }
             let m = self.divisions[index];
-            let base = self.first_fine[index];
+            let base = self.first_fine[index] as usize;
             let (mut fine_low, mut fine_high) = ([0usize; D], [0usize; D]);
-            for k in 0..D {
+            for k in 1..D {
                 fine_low[k] = self.fine_along(p[k] - radius, k, coarse[k], m) as usize;
                 fine_high[k] = self.fine_along(p[k] + radius, k, coarse[k], m) as usize;
             }
-            // Cells along x follow one another, so a whole run of them is one span of atoms.
-            let run = fine_high[0] - fine_low[0];
-            let mut row_high = fine_high;
-            row_high[0] = fine_low[0];
-            for_each_index(&fine_low, &row_high, |fine| {
-                let mut at = 0;
-                for k in (0..D).rev() {
-                    at = at * m as usize + fine[k];
+            let (count, width) = (m as usize, self.width / f64::from(m));
+            let scale = self.scale * f64::from(m);
+            let corner: Point<D> =
+                std::array::from_fn(|k| self.origin[k] + self.width * coarse[k] as f64);
+            let offset = p[0] - corner[0];
+            for_each_index(&fine_low, &fine_high, |fine| {
+                // Of a row of cells along x only what the ball can reach: its run of atoms is one span.
+                let (mut beside, mut row) = (0.0, 0);
+                for k in (1..D).rev() {
+                    let low = corner[k] + width * fine[k] as f64;
+                    let gap = (low - p[k]).max(p[k] - (low + width)).max(0.0);
+                    beside += gap * gap;
+                    row = (row + fine[k]) * count;
                 }
-                let first = base as usize + at;
-                let run = self.starts[first] as usize..self.starts[first + run + 1] as usize;
+                let half = slack - beside;
+                if half < 0.0 {
+                    return;
+                }
+                let half = half.sqrt();
+                // casts take what is below 0 as 0
+                let from = (((offset - half) * scale) as usize).min(count - 1);
+                let to = (((offset + half) * scale) as usize).min(count - 1);
+                let first = base + row;
+                let run = self.starts[first + from] as usize..self.starts[first + to + 1] as usize;
                 span(&self.order[run.clone()], &self.sorted[run]);
             });
         });
