@@ -42,6 +42,17 @@ pub enum LatticeError {
         /// 0 for x, 1 for y, 2 for z.
         axis: usize,
     },
+    /// Lengths whose squares, in single precision for some, would overflow or vanish.
+    #[error(
+        "a nominal distance of {distance:e} in a box of {extent:e}; expected lengths of {:e} to {:e}",
+        LENGTHS.start(), LENGTHS.end()
+    )]
+    Scale {
+        /// The least nominal distance.
+        distance: f64,
+        /// The box's greatest extent.
+        extent: f64,
+    },
     /// A seed point lies outside the box.
     #[error(
         "seed point {index} at {point:?} lies outside the box {min:?} to {max:?} (lattice coordinates)"
@@ -76,13 +87,16 @@ pub enum LatticeError {
     Cancelled(#[from] Cancelled),
 }
 
+/// Lengths that can be reckoned with.
+const LENGTHS: std::ops::RangeInclusive<f64> = 1e-30..=1e30;
+
 /// Atoms beyond which cells could not be counted in 32 bits.
 const ATOM_LIMIT: usize = 500_000_000;
 
 /// Grows a lattice that fills the box.
 ///
 /// # Errors
-/// [`LatticeError`] if the box is thin, a seed lies outside, or the work was cancelled.
+/// [`LatticeError`] if the box is thin, lengths are absurd, a seed lies outside, or the work was cancelled.
 pub fn grow<const D: usize>(
     crystal: &Crystal<D>,
     bounds: Bounds<D>,
@@ -132,6 +146,10 @@ impl<'a, const D: usize> Boundary<'a, D> {
         let extent = bounds.extent();
         if let Some(axis) = (0..D).find(|&k| extent[k] <= 0.0) {
             return Err(LatticeError::Thin { axis });
+        }
+        let (least, longest) = (distance.least(), extent.iter().copied().fold(0.0, f64::max));
+        if !(LENGTHS.contains(&least) && LENGTHS.contains(&longest)) {
+            return Err(LatticeError::Scale { distance: least, extent: longest });
         }
         let quantum = 2f64.powi(distance.least().log2().floor() as i32 - 16);
         Ok(Self { lattice: Lattice::empty(bounds), distance, quantum })
