@@ -32,15 +32,23 @@ impl Estimate {
     }
 }
 
+/// What the number of atoms of a lattice depends on.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct Filling {
+    /// Atoms per d^D.
+    pub density: f64,
+    /// By how much the boundary's atoms seem to widen the box along each axis, in d; measured.
+    pub rim: f64,
+}
+
 /// About how many atoms fill the box, its boundary included.
 pub(super) fn atoms<const D: usize>(
     grid: &Grid<D>,
     distance: &NominalDistance<D>,
-    density: f64,
+    filling: Filling,
 ) -> f64 {
-    // The boundary layer counts half of its atoms twice; a box of extent L has L/d + 1 of them a side.
     let extent = grid.bounds().extent();
     let d = distance.mean();
-    let layers: f64 = extent.iter().map(|e| 1.0 + 0.3 * d / e).product();
-    (distance.estimated_atoms(density) * layers).max((1 << D) as f64)
+    let widened: f64 = extent.iter().map(|e| 1.0 + filling.rim * d / e).product();
+    (distance.estimated_atoms(filling.density) * widened).max((1 << D) as f64)
 }

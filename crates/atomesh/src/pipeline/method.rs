@@ -4,6 +4,7 @@ use crate::lattice::{Crystal, Scatterer};
 use crate::mesh::Delaunay;
 
 use super::error::PipelineError;
+use super::estimate::Filling;
 use super::options::LatticeKind;
 
 /// The crystals and the connector of one dimension.
@@ -13,6 +14,7 @@ pub struct Method<const D: usize> {
     crystals: Vec<(LatticeKind, Crystal<D>)>,
     delaunay: Delaunay<D>,
     scatterer: Scatterer<D>,
+    scattered: Filling,
 }
 
 impl Method<2> {
@@ -22,6 +24,7 @@ impl Method<2> {
             crystals: vec![(LatticeKind::Hexagonal, Crystal::hexagonal())],
             delaunay: Delaunay::<2>::new(),
             scatterer: Scatterer::<2>::new(),
+            scattered: Filling { density: 1.15, rim: 0.3 },
         }
     }
 }
@@ -36,6 +39,7 @@ impl Method<3> {
             ],
             delaunay: Delaunay::<3>::new(),
             scatterer: Scatterer::<3>::new(),
+            scattered: Filling { density: 1.36, rim: 0.85 },
         }
     }
 }
@@ -53,10 +57,14 @@ impl<const D: usize> Method<D> {
         }
     }
 
-    /// Atoms per d^D.
-    pub(super) fn density(&self, kind: LatticeKind) -> f64 {
+    /// How many atoms a lattice has.
+    pub(super) fn filling(&self, kind: LatticeKind) -> Filling {
+        if kind == LatticeKind::Random {
+            return self.scattered;
+        }
         let crystal = self.crystals.iter().find(|(name, _)| *name == kind);
-        crystal.unwrap_or(&self.crystals[0]).1.density()
+        let density = crystal.unwrap_or(&self.crystals[0]).1.density();
+        Filling { density, rim: 0.3 }
     }
 
     /// What connects the atoms.

@@ -38,6 +38,7 @@ use crate::enhance::{self, FeatureOptions, Features};
 use crate::geometry::{Point, hilbert_order};
 use crate::image::{Frame, Grid, Image, Units};
 use crate::lattice::{GrowOptions, Lattice, ScatterOptions, grow, scatter};
+use crate::mesh::merge_duplicates;
 use crate::optimize::{EngineKind, Fields, optimize};
 use crate::potential::{ImagePotential, ImageWeight, Interpolation};
 use crate::watch::{Phase, Watch, check};
@@ -183,8 +184,8 @@ impl<const D: usize> Prepared<'_, D> {
 
     /// What the rest of the work will take.
     pub fn estimate(&self) -> Estimate {
-        let density = self.method.density(self.options.lattice);
-        let atoms = estimate::atoms(&self.grid, &self.distance, density);
+        let filling = self.method.filling(self.options.lattice);
+        let atoms = estimate::atoms(&self.grid, &self.distance, filling);
         let field = self.options.optimize.engine == EngineKind::Sampled;
         let spline = self.options.interpolation == Interpolation::Spline;
         let smooth = self.options.optimize.smoothing_steps > 0;
@@ -237,8 +238,10 @@ impl<const D: usize> Prepared<'_, D> {
             Fields { potential: &self.potential, weight: &self.weight, distance: &self.distance };
         let optimized = optimize(lattice, fields, &self.options.optimize, watch)?;
         let (lattice, report) = optimized.into_parts();
-        let mesh = self.method.delaunay().connect(lattice.atoms(), watch)?;
-        drop(lattice);
+        // where the image alone counts, atoms may fall into the same corner
+        let (points, _) = merge_duplicates(lattice.atoms());
+        let mesh = self.method.delaunay().connect(&points, watch)?;
+        drop((lattice, points));
         let distance = mesh.points().iter().map(|p| self.distance.at(p) as f32).collect();
         let potential = mesh.points().iter().map(|p| self.potential.value(p) as f32).collect();
         Ok(Outcome {
