@@ -20,8 +20,8 @@ fn main() -> Result<(), Box<dyn std::error::Error>> {
     let options = MeshOptions { size: Size::Constant(6.0), ..Default::default() };
     let outcome = prepare(&Method::flat(), inputs, options, &mut Silent)?.run(&mut Silent)?;
 
-    let deep = outcome.potential_at_points().iter().filter(|b| **b < -0.8).count();
-    let around = 2.0 * std::f32::consts::PI * radius / 6.0;
-    println!("{deep} points on the circle, which has room for {around:.0}");
+    let b = outcome.potential_at_points();
+    let on_circle = b.iter().filter(|b| **b < -0.8).count();
+    println!("{on_circle} of {} points are within a sample of the circle", b.len());
     Ok(())
 }

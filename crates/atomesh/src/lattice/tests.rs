@@ -189,10 +189,13 @@ fn emptiest<const D: usize>(
 /// the crystal's, there is room for one that is not quite free: 1.1 d is more than any of them.
 const EMPTIEST: f64 = 1.1;
 
+/// A name, samples along every axis, and d as a function of the place.
+type Case<'a, const D: usize> = (&'a str, [usize; D], &'a dyn Fn(&Point<D>) -> f64);
+
 fn every_place_has_an_atom_near<const D: usize>(
     crystal: &Crystal<D>,
     delaunay: &Delaunay<D>,
-    cases: &[(&str, [usize; D], &dyn Fn(&Point<D>) -> f64)],
+    cases: &[Case<'_, D>],
 ) {
     for (name, shape, d) in cases {
         let grid = grid(*shape);
@@ -206,7 +209,7 @@ fn every_place_has_an_atom_near<const D: usize>(
 
 #[test]
 fn growth_reaches_every_part_of_the_box() {
-    let cases: [(&str, [usize; 2], &dyn Fn(&Point<2>) -> f64); 5] = [
+    let cases: [Case<'_, 2>; 5] = [
         ("constant", [80, 60], &|_| 4.0),
         ("fine to the left", [80, 60], &|p| 2.0 + 0.1 * p[0]),
         ("fine in the middle", [80, 60], &|p| 2.0 + 0.2 * (p[0] - 40.0).abs()),
@@ -218,7 +221,7 @@ fn growth_reaches_every_part_of_the_box() {
         }),
     ];
     every_place_has_an_atom_near(&Crystal::hexagonal(), &Delaunay::<2>::new(), &cases);
-    let cases: [(&str, [usize; 3], &dyn Fn(&Point<3>) -> f64); 6] = [
+    let cases: [Case<'_, 3>; 6] = [
         ("constant", [24, 20, 22], &|_| 4.0),
         ("a slab as thick as d", [40, 40, 5], &|_| 4.0),
         ("a slab thinner than d", [40, 40, 4], &|_| 5.0),
