@@ -10,6 +10,7 @@ mod dimension;
 mod failure;
 mod frame_options;
 mod memory;
+mod mesh_file;
 mod outputs;
 mod progress;
 mod run_config;
@@ -19,7 +20,7 @@ mod values;
 use std::io::Write;
 use std::process::ExitCode;
 
-use clap::{Parser, Subcommand};
+use clap::{CommandFactory, Parser, Subcommand};
 
 use failure::Failure;
 use progress::{Progress, Verbosity, catch_interrupts};
@@ -45,6 +46,12 @@ struct Cli {
 #[derive(Debug, Subcommand)]
 enum Command {
     Mesh(Box<commands::mesh::MeshArgs>),
+    Report(Box<commands::report::ReportArgs>),
+    Info(Box<commands::info::InfoArgs>),
+    Check(commands::check::CheckArgs),
+    Synth(commands::synth::SynthArgs),
+    Completions(commands::completions::CompletionsArgs),
+    Man(commands::man::ManArgs),
 }
 
 impl Cli {
@@ -60,6 +67,12 @@ impl Cli {
         let mut watch = Progress::new(self.verbosity());
         let result = match self.command {
             Command::Mesh(args) => commands::mesh::run(*args, &mut watch),
+            Command::Report(args) => commands::report::run(&args, &mut watch),
+            Command::Info(args) => commands::info::run(&args, &mut watch),
+            Command::Check(args) => commands::check::run(&args),
+            Command::Synth(args) => commands::synth::run(&args, &mut watch),
+            Command::Completions(args) => Ok(commands::completions::run(&args, Cli::command())),
+            Command::Man(args) => commands::man::run(&args, Cli::command()),
         };
         watch.finish();
         result

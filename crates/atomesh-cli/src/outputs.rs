@@ -27,14 +27,16 @@ pub struct Outputs {
     /// The report.
     pub report: Option<PathBuf>,
     potential: Option<PathBuf>,
+    /// Whether the image comes from a format in which z is up where it grows.
+    z_is_height: bool,
 }
 
 impl Outputs {
-    /// The files of a run.
+    /// The files of a run on an image.
     ///
     /// # Errors
     /// [`Failure`] if the mesh is missing or an ending unknown.
-    pub fn new(options: &OutputOptions) -> Result<Self, Failure> {
+    pub fn new(options: &OutputOptions, image: &Path) -> Result<Self, Failure> {
         let Some(mesh) = options.output.clone() else {
             return Err(Failure::misuse("no mesh to write; expected -o MESH, as in -o mesh.vtu"));
         };
@@ -58,7 +60,12 @@ impl Outputs {
         if let Some(path) = &potential {
             check_potential(path)?;
         }
-        Ok(Self { mesh, mesh_format, picture, report: options.report.clone(), potential })
+        let z_is_height = matches!(
+            ImageFormat::from_path(image),
+            Some(ImageFormat::Nifti | ImageFormat::NiftiGz)
+        );
+        let report = options.report.clone();
+        Ok(Self { mesh, mesh_format, picture, report, potential, z_is_height })
     }
 
     /// Whether the image is still needed after the atoms have felt it.
@@ -112,7 +119,8 @@ impl Outputs {
     ) -> Result<(), Failure> {
         if let (Some((path, format)), Some(image)) = (&self.picture, image) {
             watch.begin(Phase::Draw);
-            let style = Style { units: outcome.units(), ..Style::default() };
+            let z_up = self.z_is_height && outcome.frame().direction()[D - 1][D - 1] > 0.0;
+            let style = Style { units: outcome.units(), z_up, ..Style::default() };
             let picture = (dimension.draw)(image, &outcome.sample_mesh(), &style);
             let bytes = picture.and_then(|p| p.encode(*format)).map_err(Failure::content)?;
             write_bytes(path, &bytes)?;

@@ -72,11 +72,11 @@ pub fn run(args: MeshArgs, watch: &mut Progress) -> Result<String, Failure> {
         run = run.or(RunConfig::parse(&text).map_err(|f| f.about(path))?);
     }
     run.check()?;
-    let outputs = if args.dry_run { None } else { Some(Outputs::new(&run.output)?) };
+    let shown = shown_path(&run)?.to_path_buf();
+    let outputs = if args.dry_run { None } else { Some(Outputs::new(&run.output, &shown)?) };
     if let Some(outputs) = &outputs {
         outputs.check(&run.input, args.write_config.as_deref())?;
     }
-    let shown = shown_path(&run)?.to_path_buf();
     let image = frame_options::read(&shown, run.frame.raw_layout()?, watch)?;
     let job = Job { run: &run, path: &shown, outputs, write_config: args.write_config.as_deref() };
     match image {

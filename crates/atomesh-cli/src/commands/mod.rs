@@ -1,3 +1,21 @@
 //! The commands, one file each.
 
+pub mod check;
+pub mod completions;
+pub mod info;
+pub mod man;
 pub mod mesh;
+pub mod report;
+pub mod synth;
+
+use atomesh::measure::MeasureError;
+
+use crate::failure::Failure;
+
+/// What measuring refuses, in the user's terms.
+fn measure_failure(error: MeasureError) -> Failure {
+    match error {
+        MeasureError::Cancelled(_) => Failure::cancelled(),
+        _ => Failure::content(error),
+    }
+}

@@ -38,7 +38,7 @@ use crate::enhance::{self, FeatureOptions, Features};
 use crate::geometry::{Point, hilbert_order};
 use crate::image::{Frame, Grid, Image, Units};
 use crate::lattice::{GrowOptions, Lattice, ScatterOptions, grow, scatter};
-use crate::mesh::merge_duplicates;
+use crate::mesh::{Mesh, merge_duplicates};
 use crate::optimize::{EngineKind, Fields, optimize};
 use crate::potential::{ImagePotential, ImageWeight, Interpolation};
 use crate::watch::{Phase, Watch, check};
@@ -267,15 +267,26 @@ fn snap_to<const D: usize>(p: &Point<D>, bounds: &crate::geometry::Bounds<D>) ->
 }
 
 /// The mesh with its points moved to the world: cells turn over where the frame mirrors.
-fn place<const D: usize>(
-    mesh: &crate::mesh::Mesh<D>,
-    frame: &Frame<D>,
-    units: Units,
-) -> crate::mesh::Mesh<D> {
-    let points = mesh.points().iter().map(|p| frame.lattice_to_world(units, p)).collect();
+fn place<const D: usize>(mesh: &Mesh<D>, frame: &Frame<D>, units: Units) -> Mesh<D> {
+    moved(mesh, frame.is_mirrored(), |p| frame.lattice_to_world(units, p))
+}
+
+/// A mesh in world coordinates, moved back to the lattice coordinates of an image's frame; the
+/// inverse of [`Outcome::world_mesh`].
+pub fn lattice_mesh<const D: usize>(mesh: &Mesh<D>, frame: &Frame<D>, units: Units) -> Mesh<D> {
+    moved(mesh, frame.is_mirrored(), |p| frame.world_to_lattice(units, p))
+}
+
+/// The mesh with its points moved, its cells turned over if the move mirrors.
+fn moved<const D: usize>(
+    mesh: &Mesh<D>,
+    mirrored: bool,
+    to: impl Fn(&Point<D>) -> Point<D>,
+) -> Mesh<D> {
+    let points = mesh.points().iter().map(to).collect();
     let mut corners = mesh.corners().to_vec();
-    if frame.is_mirrored() {
+    if mirrored {
         corners.chunks_exact_mut(D + 1).for_each(|cell| cell.swap(D - 1, D));
     }
-    crate::mesh::Mesh::new(points, corners).expect("finite frames keep points finite")
+    Mesh::new(points, corners).expect("finite frames keep points finite")
 }

@@ -2,8 +2,10 @@
 
 use crate::distance::NominalDistance;
 use crate::geometry::Point;
-use crate::image::{Frame, Units};
-use crate::measure::{AlignmentOptions, AlignmentReport, ShapeReport, alignment, features, shape};
+use crate::image::{Frame, Grid, Units};
+use crate::measure::{
+    AlignmentOptions, AlignmentReport, MeasureError, ShapeReport, alignment, features, shape,
+};
 use crate::mesh::Mesh;
 use crate::optimize::OptimizeReport;
 use crate::potential::ImagePotential;
@@ -47,10 +49,7 @@ impl<const D: usize> Outcome<D> {
 
     /// The mesh in sample coordinates: what drawing and alignment work in.
     pub fn sample_mesh(&self) -> Mesh<D> {
-        let step = self.potential.grid().step;
-        let to_sample = |p: &Point<D>| std::array::from_fn(|k| p[k] / step[k]);
-        let points = self.mesh.points().iter().map(to_sample).collect();
-        Mesh::new(points, self.mesh.corners().to_vec()).expect("steps above 0 keep points finite")
+        in_samples(&self.mesh, self.potential.grid())
     }
 
     /// d at the mesh's points, in lattice units.
@@ -98,14 +97,38 @@ impl<const D: usize> Outcome<D> {
     /// # Errors
     /// [`PipelineError::Measure`], also when cancelled.
     pub fn report(&self, watch: &mut dyn Watch) -> Result<MeshReport, PipelineError> {
-        let grid = self.potential.grid();
-        let shape = shape(&self.mesh, Some(&grid.bounds()), watch)?;
-        // d in samples: the geometric mean over the axes, where steps differ
-        let step = grid.step.iter().product::<f64>().powf(1.0 / D as f64);
-        let size = self.distance.mean() / step;
-        let found = features(self.potential.samples(), grid.shape, size, watch)?;
-        let alignment =
-            alignment(&self.sample_mesh(), &found, &AlignmentOptions::new(size), watch)?;
-        Ok(MeshReport { shape, alignment })
+        let size = self.distance.mean();
+        MeshReport::new(&self.mesh, self.potential.grid(), self.potential.samples(), size, watch)
+            .map_err(PipelineError::Measure)
     }
+}
+
+impl MeshReport {
+    /// Measures a mesh in lattice coordinates against the samples of b on a grid, for features that
+    /// edges of the length `size`, in lattice units, can follow.
+    ///
+    /// # Errors
+    /// [`MeasureError`], also when cancelled.
+    pub fn new<const D: usize>(
+        mesh: &Mesh<D>,
+        grid: &Grid<D>,
+        potential: &[f32],
+        size: f64,
+        watch: &mut dyn Watch,
+    ) -> Result<Self, MeasureError> {
+        let shape = shape(mesh, Some(&grid.bounds()), watch)?;
+        // d in samples: by the geometric mean over the axes, where steps differ
+        let size = size / grid.step.iter().product::<f64>().powf(1.0 / D as f64);
+        let found = features(potential, grid.shape, size, watch)?;
+        let options = AlignmentOptions::new(size);
+        let alignment = alignment(&in_samples(mesh, grid), &found, &options, watch)?;
+        Ok(Self { shape, alignment })
+    }
+}
+
+/// The mesh with its points moved from lattice to sample coordinates.
+fn in_samples<const D: usize>(mesh: &Mesh<D>, grid: &Grid<D>) -> Mesh<D> {
+    let to_sample = |p: &Point<D>| std::array::from_fn(|k| p[k] / grid.step[k]);
+    let points = mesh.points().iter().map(to_sample).collect();
+    Mesh::new(points, mesh.corners().to_vec()).expect("steps above 0 keep points finite")
 }

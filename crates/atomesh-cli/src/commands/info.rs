@@ -1,0 +1,149 @@
+//! `atomesh info`: what an image or mesh file holds.
+
+use std::fmt::Write;
+use std::path::PathBuf;
+
+use atomesh::geometry::Bounds;
+use atomesh::image::Frame;
+use atomesh::measure::shape;
+use atomesh::watch::Watch;
+use atomesh_io::image::AnyImage;
+use atomesh_io::mesh::{AnyMesh, LoadedMesh, MeshFormat};
+
+use crate::failure::Failure;
+use crate::frame_options::{self, FrameOptions};
+use crate::mesh_file;
+
+/// Show what an image or mesh file holds
+///
+/// Images: shape, sample type, frame, range, NaN count. Meshes: counts, box, quality, fields at the
+/// points, and the options that made them.
+#[derive(Debug, clap::Args)]
+#[command(after_help = "\
+Examples:
+  atomesh info brain.nii.gz
+  atomesh info mesh.vtu
+  atomesh info cube.raw --shape 300,200,100 --dtype float32")]
+pub struct InfoArgs {
+    /// Image or mesh
+    #[arg(value_name = "FILE")]
+    file: PathBuf,
+    #[command(flatten, next_help_heading = "Frame")]
+    frame: FrameOptions,
+}
+
+/// Runs the command; the text is for standard output.
+///
+/// # Errors
+/// [`Failure`] if the file cannot be read.
+pub fn run(args: &InfoArgs, watch: &mut dyn Watch) -> Result<String, Failure> {
+    let raw = args.frame.raw_layout()?;
+    if raw.is_none() && MeshFormat::of(&args.file).is_ok() {
+        return match &mesh_file::read(&args.file)? {
+            AnyMesh::Flat(loaded) => mesh_text(loaded, "triangles", watch),
+            AnyMesh::Volume(loaded) => mesh_text(loaded, "tetrahedra", watch),
+        }
+        .map_err(|f| f.about(&args.file));
+    }
+    let image = frame_options::read(&args.file, raw, watch)?;
+    let mut text = String::new();
+    let range = image.range();
+    line(&mut text, "type", image.type_name());
+    line(&mut text, "range", format_args!("{} to {}", range.min, range.max));
+    line(&mut text, "NaN", range.nan_count);
+    if range.infinite_count > 0 {
+        line(&mut text, "infinite", range.infinite_count);
+    }
+    let frame = match &image {
+        AnyImage::Flat(image) => frame_text(&args.frame.apply(*image.frame())?),
+        AnyImage::Volume(image) => frame_text(&args.frame.apply(*image.frame())?),
+    };
+    Ok(frame + &text)
+}
+
+/// A line of a name and a value.
+fn line(text: &mut String, name: &str, value: impl std::fmt::Display) {
+    // writing to a string cannot fail
+    let _ = writeln!(text, "{name:<10} {value}");
+}
+
+/// Numbers as options take them.
+fn list<T: std::fmt::Display>(numbers: &[T]) -> String {
+    numbers.iter().map(T::to_string).collect::<Vec<_>>().join(",")
+}
+
+fn box_text<const D: usize>(min: [f64; D], max: [f64; D]) -> String {
+    let range = |k: usize| format!("{}..{}", min[k], max[k]);
+    (0..D).map(range).collect::<Vec<_>>().join(",")
+}
+
+fn frame_text<const D: usize>(frame: &Frame<D>) -> String {
+    let mut text = String::new();
+    line(&mut text, "shape", list(&frame.shape()));
+    line(&mut text, "spacing", list(&frame.spacing()));
+    line(&mut text, "origin", list(&frame.origin()));
+    line(&mut text, "direction", list(&frame.direction().concat()));
+    let last = frame.shape().map(|n| (n - 1) as f64);
+    let corners = (0..1 << D).map(|corner| -> [f64; D] {
+        let at = |k: usize| if corner >> k & 1 == 0 { 0.0 } else { last[k] };
+        frame.lattice_to_world(atomesh::image::Units::Samples, &std::array::from_fn(at))
+    });
+    let (mut min, mut max) = ([f64::INFINITY; D], [f64::NEG_INFINITY; D]);
+    for p in corners {
+        for k in 0..D {
+            (min[k], max[k]) = (min[k].min(p[k]), max[k].max(p[k]));
+        }
+    }
+    line(&mut text, "box", box_text(min, max));
+    text
+}
+
+fn mesh_text<const D: usize>(
+    loaded: &LoadedMesh<D>,
+    cells: &str,
+    watch: &mut dyn Watch,
+) -> Result<String, Failure> {
+    let mesh = &loaded.mesh;
+    let mut text = String::new();
+    line(&mut text, "points", mesh.points().len());
+    line(&mut text, cells, mesh.cell_count());
+    if loaded.skipped_cells > 0 {
+        line(&mut text, "left out", format_args!("{} other cells", loaded.skipped_cells));
+    }
+    if let Some(Bounds { min, max }) = Bounds::of(mesh.points()) {
+        line(&mut text, "box", box_text(min, max));
+    }
+    let report = shape(mesh, None, watch).map_err(super::measure_failure)?;
+    let (mean, first, least) = (report.q_mean, report.q_p1, report.q_min);
+    line(
+        &mut text,
+        "quality",
+        format_args!("mean {mean:.4}, first percentile {first:.4}, least {least:.4}"),
+    );
+    line(
+        &mut text,
+        "angle",
+        format_args!("least {:.2}°, first percentile {:.2}°", report.angle_min, report.angle_p1),
+    );
+    line(&mut text, "edge", format_args!("mean {:.4}", report.edge_mean));
+    if report.inverted + report.flat > 0 {
+        let odd = format!("{} inverted, {} flat", report.inverted, report.flat);
+        line(&mut text, "odd cells", odd);
+    }
+    for field in &loaded.point_fields {
+        let finite = || field.values.iter().copied().filter(|v| v.is_finite());
+        let (least, greatest) =
+            (finite().fold(f32::INFINITY, f32::min), finite().fold(f32::NEG_INFINITY, f32::max));
+        let value = format!("{}, {least} to {greatest}", field.name);
+        line(&mut text, "field", value);
+    }
+    if let Some(frame) = &loaded.frame {
+        line(&mut text, "image", format_args!("{} samples", list(&frame.shape())));
+    }
+    if let Some(provenance) = &loaded.provenance {
+        line(&mut text, "made by", format_args!("atomesh {}", provenance.version));
+        line(&mut text, "seed", provenance.seed);
+        line(&mut text, "options", &provenance.options);
+    }
+    Ok(text)
+}

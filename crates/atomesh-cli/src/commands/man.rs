@@ -1,0 +1,33 @@
+//! `atomesh man`: manual pages.
+
+use std::path::PathBuf;
+
+use crate::failure::Failure;
+
+/// Print the manual page, or write one for every command
+#[derive(Debug, clap::Args)]
+#[command(
+    after_help = "Examples:\n  atomesh man | man -l -\n  atomesh man -o ~/.local/share/man/man1"
+)]
+pub struct ManArgs {
+    /// Folder for atomesh.1, atomesh-mesh.1 ...; it must exist
+    #[arg(short, long, value_name = "FOLDER")]
+    output: Option<PathBuf>,
+}
+
+/// Runs the command; the text is for standard output.
+///
+/// # Errors
+/// [`Failure`] if a page cannot be written.
+pub fn run(args: &ManArgs, mut command: clap::Command) -> Result<String, Failure> {
+    let Some(folder) = &args.output else {
+        let mut page = Vec::new();
+        clap_mangen::Man::new(command).render(&mut page).map_err(Failure::content)?;
+        return Ok(String::from_utf8_lossy(&page).into_owned());
+    };
+    // a page for `help` would say what `--help` says
+    command = command.disable_help_subcommand(true);
+    clap_mangen::generate_to(command, folder)
+        .map_err(|e| Failure::content(format!("cannot be written: {e}")).about(folder))?;
+    Ok(String::new())
+}

@@ -1,0 +1,27 @@
+//! Reading meshes for the commands that look at them.
+
+use std::path::Path;
+
+use atomesh_io::mesh::{AnyMesh, MeshReadError, read_mesh};
+
+use crate::failure::Failure;
+use crate::memory;
+
+/// Reads a mesh, unless its file alone is larger than the memory there is.
+pub fn read(path: &Path) -> Result<AnyMesh, Failure> {
+    let bytes = path.metadata().map_or(0, |m| m.len());
+    if let Some(available) = memory::available().filter(|&available| bytes > available) {
+        let (bytes, available) = (memory::text(bytes), memory::text(available));
+        let message = format!("holds {bytes}; expected less than the {available} of memory left");
+        return Err(Failure::content(message).about(path));
+    }
+    read_mesh(path).map_err(|e| match e {
+        MeshReadError::Format(_) => {
+            let known = atomesh_io::mesh::MeshFormat::EXTENSIONS;
+            let message = format!("the ending says no mesh format; expected one of {known}");
+            Failure::misuse(message).about(path)
+        }
+        MeshReadError::Io(e) => Failure::content(format!("cannot be read: {e}")).about(path),
+        _ => Failure::content(e).about(path),
+    })
+}

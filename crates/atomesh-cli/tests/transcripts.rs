@@ -1,0 +1,162 @@
+//! Runs the transcripts of `tests/cmd/*.md`: what they show is what the command prints.
+//!
+//! A transcript is a `console` block. `$ ` starts a command, which `sh` runs in a folder of its own for
+//! the file; `? N` is the exit code if it is not 0; the rest is what it prints on standard output and
+//! standard error. `[..]` stands for any text within a line, a line `...` for any lines. With
+//! ATOMESH_UPDATE=1 transcripts that differ are rewritten, to be read before they are kept.
+
+#![cfg(unix)]
+
+use std::fmt::Write;
+use std::fs;
+use std::path::Path;
+use std::process::Command;
+
+/// A command and what came of it.
+struct Run {
+    command: String,
+    code: i32,
+    output: Vec<String>,
+}
+
+impl Run {
+    fn text(&self) -> String {
+        let mut text = format!("$ {}\n", self.command);
+        if self.code != 0 {
+            let _ = writeln!(text, "? {}", self.code);
+        }
+        for line in &self.output {
+            let _ = writeln!(text, "{line}");
+        }
+        text
+    }
+}
+
+/// The runs of a block's lines.
+fn parse(lines: &[&str]) -> Vec<Run> {
+    let mut runs: Vec<Run> = Vec::new();
+    for line in lines {
+        if let Some(command) = line.strip_prefix("$ ") {
+            runs.push(Run { command: command.into(), code: 0, output: vec![] });
+            continue;
+        }
+        let run = runs.last_mut().expect("a block starts with a command");
+        match line.strip_prefix("? ") {
+            Some(code) if run.output.is_empty() => run.code = code.parse().expect("an exit code"),
+            _ => run.output.push((*line).into()),
+        }
+    }
+    runs
+}
+
+/// Runs a command in a folder.
+fn execute(command: &str, folder: &Path) -> Run {
+    let program = Path::new(env!("CARGO_BIN_EXE_atomesh"));
+    let path = std::env::var("PATH").unwrap_or_default();
+    let output = Command::new("sh")
+        .args(["-c", &format!("exec 2>&1\n{command}")])
+        .current_dir(folder)
+        .env("PATH", format!("{}:{path}", program.parent().unwrap().display()))
+        .env("LC_ALL", "C")
+        .env_remove("COLUMNS")
+        .output()
+        .expect("sh runs");
+    let text = String::from_utf8_lossy(&output.stdout).into_owned();
+    Run {
+        command: command.into(),
+        code: output.status.code().unwrap_or(-1),
+        output: text.lines().map(|l| l.trim_end().to_owned()).collect(),
+    }
+}
+
+/// Whether a line is as a pattern says.
+fn line_matches(pattern: &str, line: &str) -> bool {
+    let parts: Vec<&str> = pattern.split("[..]").collect();
+    let Some(mut rest) = line.strip_prefix(parts[0]) else { return false };
+    if parts.len() == 1 {
+        return rest.is_empty();
+    }
+    let last = parts[parts.len() - 1];
+    for part in &parts[1..parts.len() - 1] {
+        match rest.find(part) {
+            Some(at) => rest = &rest[at + part.len()..],
+            None => return false,
+        }
+    }
+    rest.ends_with(last)
+}
+
+/// Whether lines are as patterns say.
+fn matches(patterns: &[String], lines: &[String]) -> bool {
+    match (patterns.split_first(), lines.split_first()) {
+        (None, None) => true,
+        (Some((p, more)), _) if p == "..." => {
+            (0..=lines.len()).any(|skip| matches(more, &lines[skip..]))
+        }
+        (Some((p, more)), Some((l, rest))) => line_matches(p, l) && matches(more, rest),
+        _ => false,
+    }
+}
+
+/// Runs a transcript; returns its text as it should be and what differed.
+fn check(text: &str, folder: &Path) -> (String, Vec<String>) {
+    let (mut out, mut faults) = (String::new(), Vec::new());
+    let mut lines = text.lines();
+    while let Some(line) = lines.next() {
+        let _ = writeln!(out, "{line}");
+        if line != "```console" {
+            continue;
+        }
+        let block: Vec<&str> = lines.by_ref().take_while(|l| *l != "```").collect();
+        for expected in parse(&block) {
+            let found = execute(&expected.command, folder);
+            let same = expected.code == found.code && matches(&expected.output, &found.output);
+            if !same {
+                faults.push(format!("expected\n{}found\n{}", expected.text(), found.text()));
+            }
+            out += &if same { expected } else { found }.text();
+        }
+        out += "```\n";
+    }
+    (out, faults)
+}
+
+#[test]
+fn the_command_does_what_the_transcripts_show() {
+    let folder = Path::new(env!("CARGO_MANIFEST_DIR")).join("tests/cmd");
+    let mut paths: Vec<_> = fs::read_dir(folder).unwrap().map(|e| e.unwrap().path()).collect();
+    paths.sort();
+    assert!(!paths.is_empty());
+    let update = std::env::var_os("ATOMESH_UPDATE").is_some();
+    let mut faults = String::new();
+    for path in paths {
+        let text = fs::read_to_string(&path).unwrap();
+        let (found, wrong) = check(&text, tempfile::tempdir().unwrap().path());
+        if !wrong.is_empty() && update {
+            fs::write(&path, found).unwrap();
+        }
+        for fault in wrong {
+            let _ = writeln!(faults, "{}: {fault}", path.file_name().unwrap().display());
+        }
+    }
+    assert!(faults.is_empty(), "\n{faults}");
+}
+
+#[test]
+fn patterns_match_what_they_should_and_no_more() {
+    let lines = |text: &str| text.lines().map(str::to_owned).collect::<Vec<_>>();
+    for (pattern, text, expected) in [
+        ("a [..] c", "a b c", true),
+        ("a [..] c", "a b d", false),
+        ("[..]", "", true),
+        ("a", "a b", false),
+        ("a[..]b[..]c", "a1b2c", true),
+        ("a[..]b[..]c", "a1c2b", false),
+        ("a\n...\nz", "a\nb\nc\nz", true),
+        ("a\n...\nz", "a\nb", false),
+        ("...", "", true),
+        ("a", "a\nb", false),
+    ] {
+        assert_eq!(matches(&lines(pattern), &lines(text)), expected, "{pattern:?} {text:?}");
+    }
+}
