@@ -37,7 +37,7 @@ impl Failure {
     pub fn cancelled() -> Self {
         Self {
             kind: Kind::Cancelled,
-            message: "cancelled; nothing was written".into(),
+            message: "cancelled; no unfinished file is left".into(),
             advice: None,
         }
     }

@@ -109,3 +109,30 @@ fn print(text: &str) -> ExitCode {
         _ => ExitCode::SUCCESS,
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn the_arguments_are_consistent() {
+        Cli::command().debug_assert();
+    }
+
+    #[test]
+    fn every_name_that_help_offers_is_understood() {
+        let command = Cli::command();
+        let mesh = command.find_subcommand("mesh").expect("there is a mesh command");
+        let mut names = 0;
+        let takes_value = |a: &&clap::Arg| a.get_long().is_some() && a.get_action().takes_values();
+        for option in mesh.get_arguments().filter(takes_value) {
+            for value in option.get_possible_values() {
+                let text = format!("--{}={}", option.get_long().unwrap(), value.get_name());
+                let parsed = Cli::try_parse_from(["atomesh", "mesh", "a.png", &text]);
+                assert!(parsed.is_ok(), "{text}: {}", parsed.unwrap_err());
+                names += 1;
+            }
+        }
+        assert!(names > 20, "{names}");
+    }
+}

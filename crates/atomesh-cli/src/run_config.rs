@@ -19,7 +19,7 @@ section! {
     pub struct InputOptions {
         /// Image to mesh: .png .jpg .pgm .tif .npy .nii .nii.gz, or raw samples with --shape and
         /// --dtype. Two axes make triangles, three make tetrahedra
-        #[arg(value_name = "IMAGE")]
+        #[arg(value_name = "IMAGE", help_heading = "Arguments")]
         pub image: PathBuf,
         /// Image potential b(x) to use as it is, values in -1 (attracts) to 1 (repels), instead of
         /// the features of IMAGE. With both, IMAGE gives the frame and the picture

@@ -70,6 +70,12 @@ impl FromStr for Numbers {
     }
 }
 
+impl fmt::Display for Numbers {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        f.write_str(&self.0.iter().map(f64::to_string).collect::<Vec<_>>().join(","))
+    }
+}
+
 /// Counts set apart by commas: a shape.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(transparent)]
@@ -123,7 +129,7 @@ impl WorldBox {
         frame: &Frame<D>,
     ) -> Result<([usize; D], [usize; D]), String> {
         if self.0.len() != D {
-            return Err(format!("the crop {self} has {} ranges; expected {D}", self.0.len()));
+            return Err(format!("the crop {self} names {} of {D} axes", self.0.len()));
         }
         let (mut low, mut high) = ([f64::INFINITY; D], [f64::NEG_INFINITY; D]);
         for corner in 0..1 << D {
@@ -248,7 +254,7 @@ mod tests {
         assert_eq!(crop("-100..100,-5..1.1"), Ok(([0, 0], [10, 2])));
         let missed = crop("20..30,1..2").unwrap_err();
         assert!(missed.contains("along x") && missed.contains("12.0 to 17.0"), "{missed}");
-        assert!(crop("1..2").unwrap_err().contains("expected 2"));
+        assert!(crop("1..2").unwrap_err().contains("1 of 2 axes"));
     }
 
     #[test]

@@ -31,7 +31,7 @@ use crate::run_config::RunConfig;
 /// Lengths are in lattice units, which are the world units of the image's frame (millimetres,
 /// metres), or samples with --units samples. Places are in world coordinates.
 #[derive(Debug, clap::Args)]
-#[command(after_help = EXAMPLES)]
+#[command(after_help = EXAMPLES, allow_negative_numbers = true, override_usage = USAGE)]
 pub struct MeshArgs {
     #[command(flatten)]
     run: RunConfig,
@@ -45,6 +45,11 @@ pub struct MeshArgs {
     #[arg(long, help_heading = "Run")]
     dry_run: bool,
 }
+
+const USAGE: &str = "\
+atomesh mesh [OPTIONS] IMAGE -o MESH
+       atomesh mesh [OPTIONS] --potential FILE -o MESH
+       atomesh mesh [OPTIONS] --config TOML";
 
 const EXAMPLES: &str = "\
 Examples:
@@ -269,7 +274,7 @@ impl Job<'_> {
             PipelineError::LatticeDimension { .. } => Failure::misuse(error).about(self.path),
             PipelineError::Lattice(LatticeError::SeedOutside { index, .. }) => {
                 let point = lattice.seed_point.iter().flatten().nth(*index);
-                let point = point.map_or_else(String::new, |p| format!("{:?}", p.0));
+                let point = point.map_or_else(String::new, ToString::to_string);
                 Failure::misuse(format!("--seed-point {point} lies outside the image"))
                     .about(self.path)
                     .advise("places are in world coordinates; atomesh info IMAGE shows the box")
@@ -345,7 +350,7 @@ fn summary<const D: usize>(
 }
 
 /// Seconds that an atom takes from growth to mesh, for the dimension; a guide, from our own runs.
-const SECONDS_PER_ATOM: [f64; 2] = [5e-5, 2e-4];
+const SECONDS_PER_ATOM: [f64; 2] = [6e-5, 1e-4];
 
 fn expectation<const D: usize>(prepared: &Prepared<'_, D>, dimension: &Dimension<D>) -> String {
     let estimate = prepared.estimate();

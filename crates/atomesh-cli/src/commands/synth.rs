@@ -19,10 +19,13 @@ use crate::values::{Counts, Numbers};
 /// The true features are written beside the image, in world coordinates, as NAME.truth.json. The same
 /// options give the same bytes.
 #[derive(Debug, clap::Args)]
-#[command(after_help = "\
+#[command(
+    allow_negative_numbers = true,
+    after_help = "\
 Examples:
   atomesh synth faults -o faults.png
-  atomesh synth layers -o layers.nii.gz --shape 128,128,64 --spacing 25,25,4 --noise 0.1")]
+  atomesh synth layers -o layers.nii.gz --shape 128,128,64 --spacing 25,25,4 --noise 0.1"
+)]
 pub struct SynthArgs {
     /// What to draw. 2-D: faults, disc, slit, grains, section, section-faults; 3-D: the rest
     #[arg(value_name = "SCENE", value_parser = scene())]
@@ -122,7 +125,7 @@ fn draw<const D: usize>(
     write_bytes(&truth_path, (truth + "\n").as_bytes())?;
     let count = drawn.truth.features.len();
     watch.say(&format!(
-        "{}: {:?} samples of {}; {}: {count} features",
+        "{}: {:?} samples of {}; features in {}: {count}",
         args.output.display(),
         drawn.image.frame().shape(),
         drawn.image.samples().type_name(),

@@ -1,0 +1,179 @@
+//! Whole runs of the command: same bytes, true proportions, mirrored frames, Ctrl-C.
+
+use std::fs;
+use std::path::Path;
+use std::process::{Command, Output};
+
+use sha2::{Digest, Sha256};
+
+fn atomesh(folder: &Path, arguments: &str) -> Output {
+    let mut command = Command::new(env!("CARGO_BIN_EXE_atomesh"));
+    command.current_dir(folder).args(arguments.split_whitespace()).output().unwrap()
+}
+
+/// Runs a command that must succeed, and returns what it prints.
+fn succeed(folder: &Path, arguments: &str) -> String {
+    let output = atomesh(folder, arguments);
+    let errors = String::from_utf8_lossy(&output.stderr);
+    assert!(output.status.success(), "atomesh {arguments}: {errors}");
+    String::from_utf8(output.stdout).unwrap()
+}
+
+fn digest(path: &Path) -> Vec<u8> {
+    Sha256::digest(fs::read(path).unwrap()).to_vec()
+}
+
+fn json(path: &Path) -> serde_json::Value {
+    serde_json::from_slice(&fs::read(path).unwrap()).unwrap()
+}
+
+#[test]
+fn a_mesh_is_the_same_on_a_second_run_and_at_any_number_of_threads() {
+    let folder = tempfile::tempdir().unwrap();
+    let folder = folder.path();
+    succeed(folder, "synth faults -o flat.png --shape 96,80 -q");
+    succeed(folder, "synth sphere -o volume.npy --shape 24,24,20 --noise 0.1 -q");
+    for (image, options) in [
+        ("flat.png", "--size 6"),
+        ("flat.png", "--size 5..10 --lattice random --engine sampled"),
+        ("volume.npy", "--size 4 --features edges"),
+    ] {
+        for ending in ["vtu", "npz"] {
+            let run = |name: &str, threads: &str| {
+                let name = format!("{name}.{ending}");
+                succeed(
+                    folder,
+                    &format!("mesh {image} -o {name} {options} --threads {threads} -q"),
+                );
+                digest(&folder.join(name))
+            };
+            let first = run("first", "1");
+            assert_eq!(first, run("second", "1"), "{image} {options} {ending}: second run");
+            assert_eq!(first, run("third", "2"), "{image} {options} {ending}: two threads");
+            assert_ne!(first, run("fourth", "2 --seed 1"), "the digest does not see the mesh");
+        }
+    }
+}
+
+/// Equal proportions in world units, though samples are four times as long along z: the root mean
+/// squares of the edges' components along each axis are within 5 % of each other.
+#[test]
+fn samples_of_1_by_1_by_4_millimetres_are_meshed_in_millimetres() {
+    let folder = tempfile::tempdir().unwrap();
+    let folder = folder.path();
+    succeed(folder, "synth sphere -o ball.nii.gz --shape 60,60,16 --spacing 1,1,4 -q");
+    succeed(folder, "mesh ball.nii.gz -o ball.vtu --features edges --size 6 --report ball.json -q");
+    let report = json(&folder.join("ball.json"));
+    let rms: Vec<f64> = report["shape"]["edge_rms_per_axis"]
+        .as_array()
+        .unwrap()
+        .iter()
+        .map(|v| v.as_f64().unwrap())
+        .collect();
+    let (least, greatest) = rms.iter().fold((f64::MAX, 0.0_f64), |(a, b), &r| (a.min(r), b.max(r)));
+    assert!(rms.len() == 3 && greatest <= 1.05 * least, "{rms:?}");
+    assert!(report["shape"]["volume_error"].as_f64().unwrap() <= 1e-12);
+
+    // in sample units the mesh is stretched along z, which shows that the test can fail
+    succeed(folder, "mesh ball.nii.gz -o b.vtu --size 3 --units samples --report b.json -q");
+    succeed(
+        folder,
+        "mesh ball.nii.gz -o b.vtu --size 3 --units samples --write-potential b.npy -q",
+    );
+    let stretched = succeed(folder, "report b.vtu --potential b.npy --units physical");
+    let stretched: serde_json::Value = serde_json::from_str(&stretched).unwrap();
+    let rms = &stretched["shape"]["edge_rms_per_axis"];
+    assert!(rms[2].as_f64().unwrap() > 2.0 * rms[0].as_f64().unwrap(), "{rms}");
+}
+
+#[test]
+fn cells_are_positive_in_mirrored_frames_and_reports_agree() {
+    let folder = tempfile::tempdir().unwrap();
+    let folder = folder.path();
+    succeed(folder, "synth sphere -o ball.npy --shape 20,18,16 -q");
+    succeed(folder, "synth disc -o disc.npy --shape 40,32 -q");
+    for (image, direction) in [
+        ("ball.npy", "-1,0,0,0,1,0,0,0,1"),
+        ("ball.npy", "0,1,0,1,0,0,0,0,1"),
+        ("disc.npy", "1,0,0,-1"),
+        ("disc.npy", "1,0,0,1"),
+    ] {
+        let frame = format!(
+            "--spacing 0.5{} --direction={direction}",
+            if image == "ball.npy" { ",0.5,0.5 --origin=7,-3,2" } else { ",0.5 --origin=-4,10" }
+        );
+        succeed(
+            folder,
+            &format!(
+                "mesh {image} -o m.vtu --features edges --size 2 --report run.json \
+             --write-potential b.npy -q {frame}"
+            ),
+        );
+        succeed(folder, "check m.vtu");
+        succeed(folder, "report m.vtu --potential b.npy --json after.json");
+        let (run, after) = (json(&folder.join("run.json")), json(&folder.join("after.json")));
+        // the world's coordinates are rounded, so lengths agree to rounding only
+        for (part, name) in [("shape", "q_mean"), ("shape", "edge_mean"), ("alignment", "recall")] {
+            let (a, b) = (run[part][name].as_f64().unwrap(), after[part][name].as_f64().unwrap());
+            assert!((a - b).abs() <= 1e-9, "{image} {direction} {name}: {a} {b}");
+        }
+        assert_eq!(after["shape"]["inverted"], 0);
+    }
+}
+
+#[test]
+fn repelled_atoms_keep_off_and_the_flag_can_be_taken_back() {
+    let folder = tempfile::tempdir().unwrap();
+    let folder = folder.path();
+    succeed(folder, "synth slit -o slit.png --shape 48,48 -q");
+    let field = |options: &str| {
+        succeed(folder, &format!("mesh slit.png -o slit.vtu --size 5 -q {options}"));
+        let info = succeed(folder, "info slit.vtu");
+        info.lines().find(|l| l.contains("potential,")).unwrap().to_owned()
+    };
+    assert!(field("--repel --write-config run.toml").contains("potential, 0 to"));
+    assert!(field("--config run.toml").contains("potential, 0 to"));
+    assert!(field("--config run.toml --repel=false").ends_with("to 0"));
+}
+
+/// The process is told to end in several phases, and does so soon, leaving no file behind.
+#[cfg(unix)]
+#[test]
+fn ctrl_c_ends_a_run_within_a_second_and_leaves_no_half_file() {
+    use std::process::Stdio;
+    use std::time::{Duration, Instant};
+
+    let folder = tempfile::tempdir().unwrap();
+    let folder = folder.path();
+    let side = 160usize;
+    // bytes that look like noise, so that no phase has an easy time
+    let noise: Vec<u8> = (0..side.pow(3) as u64)
+        .map(|i| (i.wrapping_mul(0x9e37_79b9_7f4a_7c15) >> 33) as u8)
+        .collect();
+    fs::write(folder.join("noise.raw"), noise).unwrap();
+    for delay in [200, 1000, 3000] {
+        let arguments = "mesh noise.raw -o mesh.vtu --picture mesh.png --size 3 --features edges \
+             --shape 160,160,160 --dtype uint8 --write-potential b.npy --report r.json";
+        let mut child = Command::new(env!("CARGO_BIN_EXE_atomesh"))
+            .current_dir(folder)
+            .args(arguments.split_whitespace())
+            .stderr(Stdio::piped())
+            .spawn()
+            .unwrap();
+        std::thread::sleep(Duration::from_millis(delay));
+        let pid = child.id().to_string();
+        assert!(Command::new("kill").args(["-INT", &pid]).status().unwrap().success());
+        let asked = Instant::now();
+        let code = child.wait().unwrap().code();
+        assert_eq!(code, Some(130), "after {delay} ms");
+        // a second on a machine of one's own; other tests run beside this one
+        assert!(
+            asked.elapsed() < Duration::from_secs(4),
+            "after {delay} ms: {:?}",
+            asked.elapsed()
+        );
+        eprintln!("after {delay} ms: {:?}", asked.elapsed());
+        let names: Vec<_> = fs::read_dir(folder).unwrap().map(|e| e.unwrap().file_name()).collect();
+        assert_eq!(names, ["noise.raw"]);
+    }
+}
