@@ -12,7 +12,7 @@ use serde::{Deserialize, Serialize};
 use crate::failure::Failure;
 use crate::memory;
 use crate::section::section;
-use crate::values::{Counts, Numbers, Text, WorldBox, named};
+use crate::values::{Counts, Numbers, Text, WorldBox, named, number_in};
 
 /// Which byte of a number comes first.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
@@ -43,7 +43,8 @@ section! {
         #[arg(long, value_name = "X0..X1,Y0..Y1[,Z0..Z1]", allow_hyphen_values = true)]
         pub crop: Text<WorldBox>,
         /// Value that takes the place of NaN samples; without it they are an error
-        #[arg(long, value_name = "VALUE", allow_hyphen_values = true)]
+        #[arg(long, value_name = "VALUE", allow_hyphen_values = true,
+            value_parser = number_in(f64::MIN, f64::MAX, "a finite number"))]
         pub fill: f64,
         /// Raw samples: their counts along x, y (and z), x fastest in the file. A NumPy array of
         /// shape (nz, ny, nx) is NX,NY,NZ here

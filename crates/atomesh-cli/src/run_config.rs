@@ -14,6 +14,9 @@ use crate::frame_options::{FrameOptions, axes};
 use crate::section::section;
 use crate::values::{Numbers, SizeValue, named, number_in};
 
+/// Stages on smoothed potentials that anyone could want.
+const MOST_STEPS: u64 = 10;
+
 section! {
     /// The files that a mesh is made from.
     pub struct InputOptions {
@@ -106,7 +109,7 @@ section! {
             value_parser = named::<EngineKind>(&["pairs", "sampled"]))]
         pub engine: EngineKind,
         /// Stages on a smoothed potential before the sharp one. Default: 0
-        #[arg(long, value_name = "COUNT", value_parser = clap::value_parser!(u64).range(0..=10))]
+        #[arg(long, value_name = "COUNT", value_parser = clap::value_parser!(u64).range(0..=MOST_STEPS))]
         pub smoothing_steps: u64,
         /// Relative decrease ε of the energy at which the work ends. Default: 0.001
         #[arg(long, value_name = "EPSILON",
@@ -285,6 +288,10 @@ impl RunConfig {
             ..default.optimize
         };
         optimize.validate().map_err(Failure::misuse)?;
+        if optimize.smoothing_steps as u64 > MOST_STEPS {
+            let steps = optimize.smoothing_steps;
+            return Err(Failure::misuse(format!("{steps} smoothing steps; expected 0 to {MOST_STEPS}")));
+        }
         let basis = default.features;
         Ok(MeshOptions {
             features: FeatureOptions {

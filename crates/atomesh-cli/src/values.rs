@@ -56,8 +56,19 @@ pub struct ValueError {
 
 /// Numbers set apart by commas, such as a point.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
-#[serde(transparent)]
+#[serde(try_from = "Vec<f64>")]
 pub struct Numbers(pub Vec<f64>);
+
+impl TryFrom<Vec<f64>> for Numbers {
+    type Error = ValueError;
+
+    fn try_from(numbers: Vec<f64>) -> Result<Self, ValueError> {
+        match numbers.iter().find(|n| !n.is_finite()) {
+            Some(odd) => Err(ValueError { found: odd.to_string(), expected: "finite numbers" }),
+            None => Ok(Self(numbers)),
+        }
+    }
+}
 
 impl FromStr for Numbers {
     type Err = ValueError;
