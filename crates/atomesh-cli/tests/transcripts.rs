@@ -3,7 +3,8 @@
 //! A transcript is a `console` block. `$ ` starts a command, which `sh` runs in a folder of its own for
 //! the file; `? N` is the exit code if it is not 0; the rest is what it prints on standard output and
 //! standard error. `[..]` stands for any text within a line, a line `...` for any lines. With
-//! ATOMESH_UPDATE=1 transcripts that differ are rewritten, to be read before they are kept.
+//! ATOMESH_UPDATE=1 transcripts that differ are rewritten, to be read before they are kept. The README's
+//! `console` blocks are one more transcript, which goes on where its main command ends.
 
 #![cfg(unix)]
 
@@ -140,6 +141,28 @@ fn the_command_does_what_the_transcripts_show() {
         }
     }
     assert!(faults.is_empty(), "\n{faults}");
+}
+
+/// The README's main command, less the build, as the transcripts run it.
+fn main_command(readme: &str) -> String {
+    let block = readme.split_once("```sh main\n").expect("the README has a main command").1;
+    let command = block.split_once("\n```").expect("its block ends").0;
+    let command = command.strip_prefix("cargo build --release && ").expect("it builds first");
+    command.replace("target/release/atomesh", "atomesh")
+}
+
+#[test]
+fn the_readme_shows_what_the_command_prints() {
+    let path = Path::new(env!("CARGO_MANIFEST_DIR")).join("../../README.md");
+    let text = fs::read_to_string(&path).unwrap();
+    let folder = tempfile::tempdir().unwrap();
+    let main = execute(&main_command(&text), folder.path());
+    assert_eq!(main.code, 0, "{}", main.text());
+    let (found, wrong) = check(&text, folder.path());
+    if !wrong.is_empty() && std::env::var_os("ATOMESH_UPDATE").is_some() {
+        fs::write(&path, found).unwrap();
+    }
+    assert!(wrong.is_empty(), "\n{}", wrong.join("\n"));
 }
 
 #[test]
