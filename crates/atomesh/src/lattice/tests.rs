@@ -189,7 +189,7 @@ fn emptiest<const D: usize>(
 /// the crystal's, there is room for one that is not quite free: 1.1 d is more than any of them.
 const EMPTIEST: f64 = 1.1;
 
-/// A name, samples along every axis, and d as a function of the place.
+/// A name, an image's shape, and d(x).
 type Case<'a, const D: usize> = (&'a str, [usize; D], &'a dyn Fn(&Point<D>) -> f64);
 
 fn every_place_has_an_atom_near<const D: usize>(
