@@ -27,7 +27,7 @@ pub struct Outcome<const D: usize> {
     pub(super) warnings: Vec<Warning>,
 }
 
-/// The figures of a mesh: METHOD's *shape* and *alignment*.
+/// The figures of a mesh: its shape, and how it follows the image.
 #[derive(Clone, Debug, PartialEq, serde::Serialize)]
 pub struct MeshReport {
     /// Shape of the cells, in lattice space.
