@@ -15,7 +15,7 @@ use super::image::ImagePotential;
 use super::neighbors::{CHUNK, Chunk, NeighborLists, Reach};
 
 /// How far lists reach beyond the cut-off, in nominal distances.
-const SKIN: f64 = 0.3;
+const SKIN: f64 = 0.5;
 
 /// An atom as the inner loop reads it: coordinates, then the nominal distance, then β; in 3-D the first
 /// four fill half a cache line.
