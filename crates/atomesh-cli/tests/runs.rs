@@ -76,7 +76,10 @@ fn samples_of_1_by_1_by_4_millimetres_are_meshed_in_millimetres() {
     // 5 % where nothing pulls on the lattice. An image may well stretch cells: here the surface is
     // ten edges across, and softer along z, where its samples are coarse
     for (options, most) in [("--features none", 1.05), ("--features edges", 1.15)] {
-        succeed(folder, &format!("mesh ball.nii.gz -o b.vtu {options} --size 6 --report b.json -q"));
+        succeed(
+            folder,
+            &format!("mesh ball.nii.gz -o b.vtu {options} --size 6 --report b.json -q"),
+        );
         let report = json(&folder.join("b.json"));
         let components = edge_components(&report);
         assert!(components.len() == 3 && spread(&components) <= most, "{options} {components:?}");
