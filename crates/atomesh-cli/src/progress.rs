@@ -1,20 +1,45 @@
 //! What the work is busy with: a bar on a terminal, times for the report, and Ctrl-C.
 
+use std::io::IsTerminal;
 use std::ops::ControlFlow;
 use std::sync::atomic::{AtomicBool, Ordering};
+use std::sync::{Mutex, MutexGuard, PoisonError};
 use std::time::{Duration, Instant};
 
 use atomesh::watch::{Phase, Watch};
 use indicatif::{ProgressBar, ProgressDrawTarget, ProgressStyle};
 
+use crate::failure::Failure;
+
 /// Whether Ctrl-C was pressed.
 static INTERRUPTED: AtomicBool = AtomicBool::new(false);
 
+/// Held while files are written.
+static WRITING: Mutex<()> = Mutex::new(());
+
+/// How long the work may take to its next look.
+const PATIENCE: Duration = Duration::from_millis(500);
+
 /// Lets Ctrl-C (and a request to terminate) end the work at the next look, so that files are removed
-/// that are not finished.
+/// that are not finished. If that look is long in coming, as in one iteration on millions of atoms,
+/// the process ends without it, though never while files are written.
 pub fn catch_interrupts() {
+    let end = || {
+        INTERRUPTED.store(true, Ordering::Relaxed);
+        std::thread::sleep(PATIENCE);
+        let _files_are_whole = writing();
+        let clear = if std::io::stderr().is_terminal() { "\r\x1b[2K" } else { "" };
+        let failure = Failure::cancelled();
+        eprintln!("{clear}{failure}");
+        std::process::exit(failure.code().into());
+    };
     // without a handler the system ends the process, which is no worse than failing to start
-    let _ = ctrlc::set_handler(|| INTERRUPTED.store(true, Ordering::Relaxed));
+    let _ = ctrlc::set_handler(end);
+}
+
+/// To be held while files are written: until it is dropped, only the work itself ends the process.
+pub fn writing() -> MutexGuard<'static, ()> {
+    WRITING.lock().unwrap_or_else(PoisonError::into_inner)
 }
 
 /// How much is said on the way.

@@ -76,7 +76,7 @@ section! {
         /// 6..18. Default: from the size of the image
         #[arg(long, value_name = "D | MIN..MAX", allow_hyphen_values = true)]
         pub size: SizeValue,
-        /// Weight β of the image against regularity, 0 to 1. Default: 0.5
+        /// Weight β of the image against regularity, 0 to 1. Default: 0.45
         #[arg(long, value_name = "BETA", allow_hyphen_values = true,
             value_parser = number_in(0.0, 1.0, "a number from 0 to 1"))]
         pub beta: f64,

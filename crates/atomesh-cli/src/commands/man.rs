@@ -3,6 +3,7 @@
 use std::path::PathBuf;
 
 use crate::failure::Failure;
+use crate::progress::writing;
 
 /// Print the manual page, or write one for every command
 #[derive(Debug, clap::Args)]
@@ -25,6 +26,7 @@ pub fn run(args: &ManArgs, mut command: clap::Command) -> Result<String, Failure
         clap_mangen::Man::new(command).render(&mut page).map_err(Failure::content)?;
         return Ok(String::from_utf8_lossy(&page).into_owned());
     };
+    let _guard = writing();
     // a page for `help` would say what `--help` says
     command = command.disable_help_subcommand(true);
     clap_mangen::generate_to(command, folder)

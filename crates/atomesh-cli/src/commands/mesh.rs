@@ -19,7 +19,7 @@ use crate::failure::Failure;
 use crate::frame_options;
 use crate::memory;
 use crate::outputs::{Outputs, write_bytes};
-use crate::progress::{Progress, Verbosity};
+use crate::progress::{Progress, Verbosity, writing};
 use crate::run_config::RunConfig;
 
 /// Turn an image into a mesh that follows it
@@ -80,6 +80,7 @@ pub fn run(args: MeshArgs, watch: &mut Progress) -> Result<String, Failure> {
     let shown = shown_path(&run)?.to_path_buf();
     let outputs = if args.dry_run { None } else { Some(Outputs::new(&run.output, &shown)?) };
     if let Some(outputs) = &outputs {
+        let _guard = writing();
         outputs.check(&run.input, args.write_config.as_deref())?;
     }
     let image = frame_options::read(&shown, run.frame.raw_layout()?, watch)?;
@@ -124,6 +125,7 @@ impl Job<'_> {
         };
         let outcome = prepared.run(watch).map_err(|e| self.failure(e))?;
         let figures = self.measure(&outcome, outputs.needs_report(), watch)?;
+        let _guard = writing();
         let options = self.run.provenance::<D>();
         outputs.write(&outcome, image.as_ref(), options, dimension, watch)?;
         if let Some(path) = self.write_config {

@@ -13,7 +13,7 @@ use crate::failure::Failure;
 use crate::frame_options::{self, FrameOptions};
 use crate::mesh_file;
 use crate::outputs::{check_writable, write_bytes};
-use crate::progress::Progress;
+use crate::progress::{Progress, writing};
 use crate::values::{named, number_in};
 
 /// Measure the shape of a mesh and how it follows the features of a potential
@@ -60,6 +60,7 @@ pub struct ReportArgs {
 /// [`Failure`] if a file cannot be used or options make no sense.
 pub fn run(args: &ReportArgs, watch: &mut Progress) -> Result<String, Failure> {
     if let Some(path) = &args.json {
+        let _guard = writing();
         check_writable(path)?;
     }
     let raw = args.frame.raw_layout()?;
@@ -81,6 +82,7 @@ pub fn run(args: &ReportArgs, watch: &mut Progress) -> Result<String, Failure> {
         }
     };
     let text = serde_json::to_string_pretty(&report).map_err(Failure::content)? + "\n";
+    let _guard = writing();
     match &args.json {
         Some(path) => write_bytes(path, text.as_bytes()).map(|()| String::new()),
         None => Ok(text),

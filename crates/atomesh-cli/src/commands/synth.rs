@@ -11,7 +11,7 @@ use crate::failure::Failure;
 use crate::frame_options::axes;
 use crate::memory;
 use crate::outputs::{check_writable, write_bytes};
-use crate::progress::Progress;
+use crate::progress::{Progress, writing};
 use crate::values::{Counts, Numbers};
 
 /// Make a test image whose features are known
@@ -106,8 +106,11 @@ fn draw<const D: usize>(
         return Err(Failure::content(message).advise("choose a smaller --shape"));
     }
     let truth_path = truth_path(&args.output);
-    check_writable(&args.output)?;
-    check_writable(&truth_path)?;
+    {
+        let _guard = writing();
+        check_writable(&args.output)?;
+        check_writable(&truth_path)?;
+    }
     watch.begin(Phase::Draw);
     let drawn = synthesize(args.scene, &options).map_err(|e| match e {
         SynthError::Memory { .. } => Failure::content(e),
@@ -117,6 +120,7 @@ fn draw<const D: usize>(
     if watch.step(Phase::Write, 0.0, None).is_break() {
         return Err(Failure::cancelled());
     }
+    let _guard = writing();
     write_image(&args.output, &drawn.image, watch).map_err(|e| match e.reason {
         WriteReason::Cancelled(_) => Failure::cancelled(),
         WriteReason::Shape { .. } => Failure::misuse(e),
