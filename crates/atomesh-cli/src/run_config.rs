@@ -49,7 +49,7 @@ section! {
         #[arg(long, value_name = "OPERATOR",
             value_parser = named::<EdgeOperator>(&["gaussian", "prewitt"]))]
         pub edge_operator: EdgeOperator,
-        /// Standard deviation of the Gaussian edge operator in samples, 0.3 or more. Default: 1.5
+        /// Standard deviation of the Gaussian edge operator in least steps, 0.3 or more. Default: 1.5
         #[arg(long, value_name = "SIGMA",
             value_parser = number_in(0.3, 1000.0, "a number of samples from 0.3 to 1000"))]
         pub edge_scale: f64,
@@ -57,12 +57,12 @@ section! {
         #[arg(long, value_name = "BOOL", num_args = 0..=1, require_equals = true,
             default_missing_value = "true")]
         pub repel: bool,
-        /// Standard deviation in lattice units of a Gaussian over the potential. Default: 0.7
-        /// samples for dark and bright features, none for edges
+        /// Standard deviation in lattice units of a Gaussian over the potential. Default: the
+        /// least step for dark and bright features, none for edges
         #[arg(long, value_name = "SIGMA",
             value_parser = number_in(0.0, f64::MAX, "a length of 0 or more"))]
         pub smooth: f64,
-        /// How the potential is read between samples. Default: linear
+        /// How the potential is read between samples. Default: spline in 2-D, linear in 3-D
         #[arg(long, value_name = "KIND",
             value_parser = named::<Interpolation>(&["nearest", "linear", "spline"]))]
         pub interpolation: Interpolation,
@@ -113,8 +113,7 @@ section! {
         /// 0 in 3-D
         #[arg(long, value_name = "COUNT", value_parser = clap::value_parser!(u64).range(0..=MOST_STEPS))]
         pub smoothing_steps: u64,
-        /// Relative decrease ε of the energy at which the work ends. Default: 0.0003 in
-        /// 2-D, 0.001 in 3-D
+        /// Relative decrease ε of the energy at which the work ends. Default: 0.001
         #[arg(long, value_name = "EPSILON",
             value_parser = number_in(0.0, 0.999, "a number from 0 to 0.999"))]
         pub tolerance: f64,
@@ -360,10 +359,11 @@ mod tests {
             let option = command.get_arguments().find(|a| a.get_long() == Some(&name));
             let help = option.unwrap().get_help().unwrap().to_string();
             let (_, stated) = help.split_once("Default: ").unwrap_or_else(|| panic!("{name}"));
+            let words: Vec<&str> = stated.split([' ', ',', ';']).collect();
             let stated: Vec<f64> = stated.split([' ', ',', ';']).flat_map(str::parse).collect();
             let same = match value.parse::<f64>() {
                 Ok(value) => stated.contains(&value),
-                Err(_) => help.ends_with(&format!("Default: {value}")),
+                Err(_) => words.contains(&value.as_str()),
             };
             assert!(same, "--{name} is {value}; help says: {help}");
         }

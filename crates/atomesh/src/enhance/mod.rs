@@ -31,8 +31,8 @@ const CLIPPED_EDGES: f64 = 0.005;
 /// The narrowest Gaussian, in samples, whose derivative still sees the neighbours.
 const LEAST_EDGE_SCALE: f64 = 0.3;
 
-/// Standard deviation, in samples, by which dark and bright features are rounded off.
-const ROUNDED: f64 = 0.7;
+/// Standard deviation, in least steps, by which dark and bright features are rounded off.
+const ROUNDED: f64 = 1.0;
 
 /// Samples that one task maps.
 const BLOCK: usize = 1 << 16;
@@ -74,12 +74,14 @@ pub struct FeatureOptions {
     /// How edges are found; the other features ignore it. Default: Gaussian, since one sample's
     /// noise already makes a Prewitt edge.
     pub edge_operator: EdgeOperator,
-    /// Standard deviation of the Gaussian operator in samples along every axis, 0.3 or more: less
-    /// would hardly reach the neighbours. Prewitt's ignores it. Default 1.5: wide enough to fill the gaps between samples of a slanted edge,
-    /// narrow enough to keep the two sides of a sheet of 4 samples apart.
+    /// Standard deviation of the Gaussian operator in least steps from sample to sample, 0.3 or more:
+    /// less would hardly reach the neighbours. It is as wide in lattice units along every axis, but not
+    /// below 0.7 samples along a coarser one. Prewitt's ignores it. Default 1.5: wide enough to fill
+    /// the gaps between samples of a slanted edge, narrow enough to keep the two sides of a sheet of 4
+    /// samples apart.
     pub edge_scale: f64,
     /// Standard deviation, in lattice units, of a Gaussian over the finished potential; b is not
-    /// scaled to −1 again, so narrow features become shallow. Default: 0.7 samples along every axis
+    /// scaled to −1 again, so narrow features become shallow. Default: the least step
     /// for dark and bright features, which rounds off the steps of one sample that atoms would catch
     /// on (measured on fault images: better shape and better alignment); none for edges, which the
     /// operator has smoothed. Smoothing that reaches beyond the features' width costs alignment.
@@ -108,7 +110,9 @@ impl FeatureOptions {
     fn sigma<const D: usize>(&self, grid: &Grid<D>) -> [f64; D] {
         match (self.smooth, self.features) {
             (Some(sigma), _) => grid.step.map(|step| sigma / step),
-            (None, Features::Dark | Features::Bright) => [ROUNDED; D],
+            (None, Features::Dark | Features::Bright) => {
+                grid.step.map(|step| ROUNDED * grid.least_step() / step)
+            }
             (None, Features::Edges | Features::None) => [0.0; D],
         }
     }

@@ -39,9 +39,9 @@ fn dark_features_are_rounded_off_unless_sharp_ones_are_asked_for() {
     let mut grey = vec![200u8; 41 * 41];
     (0..41).for_each(|y| grey[20 + 41 * y] = 0);
     let b = run(&image([41, 41], Samples::U8(grey)), FeatureOptions::default()).values;
-    // A line of one sample under the sampled Gaussian of σ = 0.7, cut at 4 σ: its middle weight.
-    let weight = |k: f64| f64::exp(-0.5 * (k / 0.7).powi(2));
-    let middle = 1.0 / (1.0 + 2.0 * (weight(1.0) + weight(2.0) + weight(3.0)));
+    // A line of one sample under the sampled Gaussian of σ = 1, cut at 4 σ: its middle weight.
+    let weight = |k: f64| f64::exp(-0.5 * k * k);
+    let middle = 1.0 / (1.0 + 2.0 * (weight(1.0) + weight(2.0) + weight(3.0) + weight(4.0)));
     assert!((f64::from(b[20 + 41 * 20]) + middle).abs() < 1e-6, "{} {middle}", b[20 + 41 * 20]);
 }
 

@@ -20,23 +20,31 @@ const CHUNK: usize = 512;
 /// Samples between two looks at whether to go on: a fraction of a second's work.
 const BATCH_SAMPLES: usize = 1 << 25;
 
-/// How slopes are taken; lengths in samples.
+/// A Gaussian is not made narrower than this many samples along an axis that is coarser than others: at
+/// 0.7 the slope of a ramp is still right to 0.6 %.
+const NARROWEST: f64 = 0.7;
+
+/// How slopes are taken.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(crate) enum Stencil {
     /// Centred difference of the neighbours, averaged over three samples along each other axis.
     Prewitt,
-    /// Derivative of a Gaussian of this standard deviation, in samples along every axis.
+    /// Derivative of a Gaussian of this standard deviation, in least steps of the grid.
     Gaussian(f64),
 }
 
 impl Stencil {
-    /// The kernels along an axis of `n` samples: average, slope per sample.
-    fn kernels(self, n: usize) -> (Kernel, Kernel) {
+    /// The kernels along an axis of `n` samples, `ratio` times as far apart as those of the finest axis:
+    /// average, slope per sample.
+    fn kernels(self, n: usize, ratio: f64) -> (Kernel, Kernel) {
         match self {
             Stencil::Prewitt => {
                 (Kernel::new(&[1.0 / 3.0; 2], false, n), Kernel::new(&[0.0, 0.5], true, n))
             }
-            Stencil::Gaussian(sigma) => (kernel(sigma, 0, n), kernel(sigma, 1, n)),
+            Stencil::Gaussian(sigma) => {
+                let sigma = (sigma / ratio).max(sigma.min(NARROWEST));
+                (kernel(sigma, 0, n), kernel(sigma, 1, n))
+            }
         }
     }
 }
@@ -56,8 +64,10 @@ pub fn prewitt_magnitude<const D: usize>(samples: &Samples, grid: &Grid<D>) -> V
 
 /// The magnitude of the gradient of the smoothed image, in sample values per lattice unit.
 ///
-/// Derivatives of a Gaussian of standard deviation `sigma`, in samples along every axis, as of
-/// [`gaussian_derivative`](super::gaussian_derivative), each over its axis' step. Below 0.5 or so a
+/// Derivatives of a Gaussian of standard deviation `sigma`, in least steps of the grid, as of
+/// [`gaussian_derivative`](super::gaussian_derivative), each over its axis' step. The Gaussian is as wide
+/// in lattice units along every axis, so that edges of all directions are alike, but for coarse axes,
+/// along which it is not narrower than 0.7 samples. Below 0.5 or so a
 /// Gaussian is narrower than the samples are apart, and slopes come out too small; below 1/8 it
 /// reaches no neighbour, and they are 0.
 ///
@@ -133,7 +143,9 @@ struct Stream<F, const D: usize> {
 
 impl<F: Fn(usize, &mut [f32]) + Sync, const D: usize> Stream<F, D> {
     fn new(fill: F, grid: &Grid<D>, stencil: Stencil) -> Self {
-        let pairs: [_; D] = std::array::from_fn(|axis| stencil.kernels(grid.shape[axis]));
+        let pairs: [_; D] = std::array::from_fn(|axis| {
+            stencil.kernels(grid.shape[axis], grid.step[axis] / grid.least_step())
+        });
         let kernels = std::array::from_fn(|component| {
             std::array::from_fn(|axis| {
                 let (average, slope): &(Kernel, Kernel) = &pairs[axis];
@@ -283,7 +295,9 @@ mod tests {
         let mut squared = vec![0.0f32; values.len()];
         for k in 0..D {
             let order = std::array::from_fn(|axis| u8::from(axis == k));
-            let slope = gaussian_derivative(&values, shape, [1.5; D], order);
+            // as wide in lattice units along every axis
+            let sigma = grid.step.map(|step| (1.5 / step).max(0.7));
+            let slope = gaussian_derivative(&values, shape, sigma, order);
             for (sum, s) in squared.iter_mut().zip(slope) {
                 *sum += (s / grid.step[k] as f32).powi(2);
             }

@@ -31,8 +31,7 @@ use energy::LatticeEnergy;
 pub struct OptimizeOptions {
     /// What computes the energy. Default pairs.
     pub engine: EngineKind,
-    /// ε: both loops end when the energy falls by less than this share. Default 10⁻³, the paper's;
-    /// 3·10⁻⁴ in 2-D.
+    /// ε: both loops end when the energy falls by less than this share. Default 10⁻³, the paper's.
     pub tolerance: f64,
     /// Iterations one inner loop may take. Default 200.
     pub inner_limit: usize,
@@ -103,7 +102,7 @@ impl OptimizeOptions {
     /// lets it fall into disorder, with more alignment but flat cells, so it stops early.
     pub fn for_dimension(dimension: usize) -> Self {
         if dimension == 2 {
-            Self { smoothing_steps: 2, tolerance: 3e-4, ..Self::default() }
+            Self { smoothing_steps: 2, ..Self::default() }
         } else {
             Self::default()
         }

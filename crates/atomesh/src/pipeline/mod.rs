@@ -243,7 +243,9 @@ impl<const D: usize> Prepared<'_, D> {
         let mesh = self.method.delaunay().connect(&points, watch)?;
         drop((lattice, points));
         let distance = mesh.points().iter().map(|p| self.distance.at(p) as f32).collect();
-        let potential = mesh.points().iter().map(|p| self.potential.value(p) as f32).collect();
+        let (low, high) = self.potential.range(); // a spline passes beyond it at jumps
+        let at = |p| (self.potential.value(p) as f32).clamp(low, high);
+        let potential = mesh.points().iter().map(at).collect();
         Ok(Outcome {
             mesh,
             distance_at_points: distance,

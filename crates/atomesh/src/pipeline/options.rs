@@ -61,7 +61,7 @@ impl LatticeKind {
 pub struct MeshOptions<const D: usize> {
     /// How the image becomes a potential; its `units` are overruled by [`MeshOptions::units`].
     pub features: FeatureOptions,
-    /// How b is read between samples.
+    /// How b is read between samples. Default [`Interpolation::for_dimension`].
     pub interpolation: Interpolation,
     /// The lattice space. Default physical.
     pub units: Units,
@@ -86,7 +86,7 @@ impl<const D: usize> Default for MeshOptions<D> {
     fn default() -> Self {
         Self {
             features: FeatureOptions::default(),
-            interpolation: Interpolation::default(),
+            interpolation: Interpolation::for_dimension(D),
             units: Units::default(),
             size: Size::default(),
             image_weight: 0.45,

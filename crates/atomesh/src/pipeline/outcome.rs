@@ -57,7 +57,7 @@ impl<const D: usize> Outcome<D> {
         &self.distance_at_points
     }
 
-    /// b at the mesh's points.
+    /// b at the mesh's points, within the range of its samples.
     pub fn potential_at_points(&self) -> &[f32] {
         &self.potential_at_points
     }

@@ -1,5 +1,7 @@
 //! The image potential b(x): samples, and what lies between them.
 
+use rayon::prelude::*;
+
 use crate::geometry::Point;
 use crate::image::Grid;
 
@@ -12,12 +14,23 @@ pub enum Interpolation {
     /// The nearest sample, and centred differences for the gradient: the paper's way. Value and
     /// gradient do not belong to one function.
     Nearest,
-    /// Linear along each axis: the gradient is exact and jumps at the samples. The default: at equal
-    /// alignment it costs a third of the spline.
+    /// Linear along each axis: the gradient is exact and jumps at the samples. The default in 3-D, where
+    /// the spline lets atoms go on past the crystal's stability: on a brain at d = 6 it ended in
+    /// disorder (mean quality 0.60 against 0.85).
     #[default]
     Linear,
-    /// A cubic B-spline through the samples (Unser 1999): the gradient is smooth.
+    /// A cubic B-spline through the samples (Unser 1999), one more copy of them: the gradient is smooth,
+    /// which L-BFGS likes. The default in 2-D, where it aligns better at equal shape: on a section of
+    /// thin faults at d = 6 recall rose from 0.83 to 0.93, mean quality 0.95 both times. At jumps it may
+    /// pass beyond the samples' range by a third.
     Spline,
+}
+
+impl Interpolation {
+    /// The default for images of a dimension.
+    pub fn for_dimension(dimension: usize) -> Self {
+        if dimension == 2 { Self::Spline } else { Self::Linear }
+    }
 }
 
 /// What is wrong with a potential.
@@ -104,6 +117,13 @@ impl<const D: usize> ImagePotential<D> {
     /// The samples, x fastest.
     pub fn samples(&self) -> &[f32] {
         &self.samples
+    }
+
+    /// The least and the greatest sample.
+    pub fn range(&self) -> (f32, f32) {
+        let wider = |a: (f32, f32), b: (f32, f32)| (a.0.min(b.0), a.1.max(b.1));
+        let of = |part: &[f32]| part.iter().fold((1.0, -1.0), |range, &b| wider(range, (b, b)));
+        self.samples.par_chunks(1 << 16).map(of).reduce(|| (1.0, -1.0), wider)
     }
 
     /// The samples, x fastest, without the rest.
