@@ -98,7 +98,7 @@ impl OptimizeOptions {
     ///
     /// In 2-D the hexagonal lattice is a stable minimum of the pair potential, and the longer atoms
     /// search, from a smoothed image to the sharp one, the better the mesh: fault images gain a tenth
-    /// to a third in alignment at equal shape. In 3-D no lattice of that density is: a long search
+    /// to two fifths in alignment at nearly equal shape. In 3-D no lattice of that density is: a long search
     /// lets it fall into disorder, with more alignment but flat cells, so it stops early.
     pub fn for_dimension(dimension: usize) -> Self {
         if dimension == 2 {
