@@ -60,6 +60,8 @@ pub struct Lbfgs {
     state: State,
     direction: Vec<f64>,
     history: VecDeque<Pair>,
+    /// The first loop's coefficients, the latest step's first.
+    weights: Vec<f64>,
     spare: Vec<Pair>,
 }
 
@@ -72,6 +74,7 @@ impl Lbfgs {
             state: State::new(x),
             direction,
             history: VecDeque::with_capacity(options.memory),
+            weights: Vec::with_capacity(options.memory),
             spare: Vec::new(),
         }
     }
@@ -150,17 +153,17 @@ impl Lbfgs {
     /// Writes −H·gradient into `direction`, H being the inverse Hessian that the history implies.
     fn point_downhill(&mut self) {
         update(&mut self.direction, &self.state.gradient, |p, g| *p = -g);
-        let mut weights = Vec::with_capacity(self.history.len());
+        self.weights.clear();
         for pair in self.history.iter().rev() {
             let a = dot(&pair.step, &self.direction) / pair.curvature;
             update(&mut self.direction, &pair.change, |p, y| *p -= a * f64::from(y));
-            weights.push(a);
+            self.weights.push(a);
         }
         if let Some(last) = self.history.back() {
             let scale = last.curvature / dot(&last.change, &last.change);
             self.direction.iter_mut().for_each(|p| *p *= scale);
         }
-        for (pair, a) in self.history.iter().zip(weights.into_iter().rev()) {
+        for (pair, a) in self.history.iter().zip(self.weights.iter().rev()) {
             let b = dot(&pair.change, &self.direction) / pair.curvature;
             update(&mut self.direction, &pair.step, |p, s| *p += (a - b) * f64::from(s));
         }
