@@ -1,13 +1,13 @@
 //! Linear equations and eigenvectors of a size that fits in registers.
 
 /// A square matrix, row by row; only the leading part is used where a function says so.
-pub(super) type Matrix<const D: usize> = [[f64; D]; D];
+pub(crate) type Matrix<const D: usize> = [[f64; D]; D];
 
 /// Solves `matrix · x = right` for several right sides by elimination with row pivots.
 ///
 /// Uses the leading `size` rows and columns of `matrix` and rows of `right`; the solution replaces
 /// `right`. Returns the determinant of the leading part; if it is zero `right` is left unsolved.
-pub(super) fn solve<const D: usize, const N: usize>(
+pub(crate) fn solve<const D: usize, const N: usize>(
     size: usize,
     mut matrix: Matrix<D>,
     right: &mut [[f64; N]; D],
@@ -52,7 +52,7 @@ pub(super) fn solve<const D: usize, const N: usize>(
 }
 
 /// The inverse and the determinant; `None` if the determinant is zero.
-pub(super) fn invert<const D: usize>(matrix: &Matrix<D>) -> Option<(Matrix<D>, f64)> {
+pub(crate) fn invert<const D: usize>(matrix: &Matrix<D>) -> Option<(Matrix<D>, f64)> {
     let mut inverse = identity();
     let determinant = solve(D, *matrix, &mut inverse);
     (determinant != 0.0).then_some((inverse, determinant))
@@ -67,7 +67,7 @@ fn identity<const D: usize>() -> Matrix<D> {
 ///
 /// Converges quadratically: three or four sweeps for D = 3, one for D = 2. Accurate for equal and
 /// for tiny eigenvalues, where closed forms are not.
-pub(super) fn largest_eigenpair<const D: usize>(mut a: Matrix<D>) -> (f64, [f64; D]) {
+pub(crate) fn largest_eigenpair<const D: usize>(mut a: Matrix<D>) -> (f64, [f64; D]) {
     const SWEEP_LIMIT: usize = 16;
     let mut v = identity::<D>();
     for _ in 0..SWEEP_LIMIT {

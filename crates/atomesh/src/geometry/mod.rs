@@ -6,6 +6,7 @@
 //! sample 0 is at 0 and the box reaches to `(n − 1) · step`.
 
 mod bounds;
+pub(crate) mod linear;
 mod order;
 mod predicates;
 mod simplex;

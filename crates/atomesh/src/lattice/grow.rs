@@ -10,6 +10,7 @@
 
 use crate::distance::NominalDistance;
 use crate::geometry::{Bounds, Point, distance_squared};
+use crate::mesh::MOST_POINTS;
 use crate::watch::{Cancelled, Phase, Watch, check};
 
 use super::Lattice;
@@ -90,9 +91,6 @@ pub enum LatticeError {
 /// Lengths that can be reckoned with.
 const LENGTHS: std::ops::RangeInclusive<f64> = 1e-30..=1e30;
 
-/// Atoms beyond which cells could not be counted in 32 bits.
-const ATOM_LIMIT: usize = 500_000_000;
-
 /// Grows a lattice that fills the box.
 ///
 /// # Errors
@@ -112,8 +110,8 @@ pub fn grow<const D: usize>(
     let quantum = boundary.quantum;
     let lattice = boundary.plant_and_divide(&options.seed_points)?;
     let expected = distance.estimated_atoms(crystal.density());
-    if expected > ATOM_LIMIT as f64 {
-        return Err(LatticeError::TooMany { limit: ATOM_LIMIT });
+    if expected > MOST_POINTS as f64 {
+        return Err(LatticeError::TooMany { limit: MOST_POINTS });
     }
     let (least, greatest) = (gamma * distance.least(), gamma * distance.greatest());
     let mut occupancy = Occupancy::new(bounds, least, greatest, expected as usize);

@@ -13,6 +13,7 @@ use rand_pcg::Pcg64;
 use rayon::prelude::*;
 
 use crate::distance::NominalDistance;
+use crate::geometry::linear::solve;
 use crate::geometry::{Bounds, Point, difference, distance_squared, dot};
 use crate::mesh::{ConnectError, Delaunay};
 use crate::watch::{Phase, Watch, check};
@@ -226,31 +227,15 @@ fn circumsphere<'a, const D: usize>(
 ) -> Option<(Point<D>, f64)> {
     let first = corners.next()?;
     let mut rows = [[0.0; D]; D];
-    let mut right = [0.0; D];
+    let mut right = [[0.0]; D];
     for (k, corner) in corners.enumerate() {
         rows[k] = difference(corner, first);
-        right[k] = 0.5 * dot(&rows[k], &rows[k]);
+        right[k] = [0.5 * dot(&rows[k], &rows[k])];
     }
-    // Gauss with row exchange on a D × D system
-    for k in 0..D {
-        let pivot = (k..D).max_by(|&a, &b| rows[a][k].abs().total_cmp(&rows[b][k].abs()))?;
-        rows.swap(k, pivot);
-        right.swap(k, pivot);
-        if rows[k][k] == 0.0 {
-            return None;
-        }
-        for r in k + 1..D {
-            let factor = rows[r][k] / rows[k][k];
-            let row = rows[k];
-            (k..D).for_each(|c| rows[r][c] -= factor * row[c]);
-            right[r] -= factor * right[k];
-        }
+    if solve(D, rows, &mut right) == 0.0 {
+        return None;
     }
-    let mut offset = [0.0; D];
-    for k in (0..D).rev() {
-        let rest: f64 = (k + 1..D).map(|c| rows[k][c] * offset[c]).sum();
-        offset[k] = (right[k] - rest) / rows[k][k];
-    }
+    let offset = right.map(|[x]| x);
     let radius = dot(&offset, &offset).sqrt();
     radius.is_finite().then(|| (std::array::from_fn(|k| first[k] + offset[k]), radius))
 }

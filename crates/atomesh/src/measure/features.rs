@@ -12,7 +12,7 @@
 //! Cost: O(σ) per sample; derivatives are made one at a time and kept at deep samples only.
 
 use super::MeasureError;
-use super::linear::{Matrix, largest_eigenpair};
+use crate::geometry::linear::{Matrix, largest_eigenpair};
 use crate::geometry::{Point, dot};
 use crate::image::{gaussian, gaussian_derivative};
 use crate::watch::{Phase, Watch, check};

@@ -7,7 +7,6 @@
 mod alignment;
 mod faces;
 mod features;
-mod linear;
 mod nearest;
 mod shape;
 mod statistics;

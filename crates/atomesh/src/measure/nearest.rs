@@ -5,7 +5,7 @@
 //! simply the simplices of D corners.
 
 use super::faces::faces;
-use super::linear::solve;
+use crate::geometry::linear::solve;
 use crate::geometry::{Bounds, Point, difference, dot};
 use crate::mesh::Mesh;
 

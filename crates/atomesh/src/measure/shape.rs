@@ -11,8 +11,8 @@
 
 use super::MeasureError;
 use super::faces::faces;
-use super::linear::invert;
 use super::statistics::{Histogram, percentile, sum};
+use crate::geometry::linear::invert;
 use crate::geometry::{Bounds, Point, difference, dot};
 use crate::mesh::Mesh;
 use crate::watch::{Phase, Watch, check};

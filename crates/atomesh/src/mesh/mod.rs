@@ -5,6 +5,7 @@ mod facets;
 mod validate;
 
 use crate::geometry::Simplex;
+pub(crate) use delaunay::MOST_POINTS;
 pub use delaunay::{ConnectError, Delaunay, merge_duplicates};
 pub use facets::Facet;
 pub use validate::MeshFault;

@@ -94,7 +94,7 @@ pub enum ConnectError {
 }
 
 /// The most points that can be connected: the cells' facets are numbered by 32 bits.
-const MOST_POINTS: usize = 1 << 27;
+pub(crate) const MOST_POINTS: usize = 1 << 27;
 
 /// Points inserted between two looks at the watch: some 10 ms.
 const STRIDE: usize = 4096;
