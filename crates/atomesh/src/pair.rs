@@ -39,15 +39,13 @@ pub fn force(u: f64) -> f64 {
     if u < CUTOFF { force_inside(u) } else { 0.0 }
 }
 
-/// φ(u) without the test for the cut-off: the polynomial alone, for kernels that have tested.
-#[inline]
-pub(crate) fn energy_inside(u: f64) -> f64 {
+/// φ(u) without the test for the cut-off: the polynomial alone.
+fn energy_inside(u: f64) -> f64 {
     SELF_ENERGY + u * (-9.0 / 8.0 + u * u * (19.0 / 24.0 - 5.0 / 16.0 * u))
 }
 
 /// f(u) without the test for the cut-off.
-#[inline]
-pub(crate) fn force_inside(u: f64) -> f64 {
+fn force_inside(u: f64) -> f64 {
     9.0 / 8.0 + u * u * (-19.0 / 8.0 + 5.0 / 4.0 * u)
 }
 

@@ -7,10 +7,12 @@
 
 mod bounds;
 pub(crate) mod linear;
+mod compact;
 mod order;
 mod predicates;
 mod simplex;
 pub use bounds::Bounds;
+pub use compact::{BLOCK, compact_order};
 pub use order::{hilbert_order, lexicographic};
 pub use simplex::Simplex;
 

@@ -35,7 +35,7 @@ pub use outcome::{MeshReport, Outcome};
 
 use crate::distance::{GRADIENT_LIMIT, Grading, NominalDistance, default_distance};
 use crate::enhance::{self, FeatureOptions, Features};
-use crate::geometry::{Point, hilbert_order};
+use crate::geometry::{Point, compact_order};
 use crate::image::{Frame, Grid, Image, Units};
 use crate::lattice::{GrowOptions, Lattice, ScatterOptions, grow, scatter};
 use crate::mesh::{Mesh, merge_duplicates};
@@ -217,7 +217,7 @@ impl<const D: usize> Prepared<'_, D> {
                 scatter(self.method.scatterer(), bounds, &self.distance, &options, watch)?
             }
         };
-        let order = hilbert_order(lattice.atoms());
+        let order = compact_order(lattice.atoms());
         Ok(lattice.reordered(&order))
     }
 

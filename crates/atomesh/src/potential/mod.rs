@@ -8,10 +8,13 @@
 
 mod engine;
 mod image;
+mod kernel;
+mod lanes;
 mod neighbors;
 mod pairs;
 mod sampled;
 mod spline;
+mod tree;
 #[cfg(test)]
 mod tests;
 

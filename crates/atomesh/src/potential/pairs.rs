@@ -1,25 +1,37 @@
 //! The pairs engine: energy and gradient from neighbour lists. The default.
 //!
-//! d and β are read at the atoms when the lists are built and kept until they are rebuilt, so that
-//! energy and gradient belong to one function and a line search can trust them. Lists reach farther
-//! than the cut-off by a skin and hold until an atom has moved half of it. Cost: O(n) in atoms.
+//! d and β are read at the atoms and kept until one has moved far, so that energy and gradient belong to
+//! one function and a line search can trust them. Lists reach farther than the cut-off by a skin and
+//! hold until an atom has moved half of it; a thin skin, made anew often, costs less than a thick one.
+//!
+//! Lists are found in a tree of boxes over atoms of which those that follow each other are near each other.
+//! Where the caller's order is such ([`compact_order`]) it is taken as it is, and memory is read and
+//! written in runs; else the engine keeps an order of its own, and makes it anew once atoms have moved so
+//! much that the boxes have grown. Cost: O(n) in atoms.
 
 use rayon::prelude::*;
 
 use crate::distance::NominalDistance;
-use crate::geometry::{Point, distance_squared};
+use crate::geometry::{Bounds, Point, compact_order, distance_squared};
 use crate::pair;
 
 use super::engine::{Energy, Engine, ImageWeight};
 use super::image::ImagePotential;
-use super::neighbors::{CHUNK, Chunk, NeighborLists, Reach};
+use super::kernel::{Graded, Uniform, add_pairs};
+use super::lanes::{LANES, Lanes, Plain};
+use super::neighbors::{CHUNK, NeighborLists};
+use super::tree::{Scaling, Tree};
 
-/// How far lists reach beyond the cut-off, in nominal distances.
-const SKIN: f64 = 0.5;
+/// How far lists reach beyond the cut-off, in nominal distances, or farther if atoms are to move farther.
+const SKIN: f64 = 0.2;
+/// How far an atom may move, over its nominal distance, before d and β are read anew.
+const STALE: f64 = 0.25;
+/// How much the tree's boxes may grow before atoms are put in order anew, and how much larger than cubes of
+/// eight atoms they may be for the caller's order to be taken.
+const LOOSE: f64 = 1.5;
 
-/// An atom as the inner loop reads it: coordinates, then the nominal distance, then β; in 3-D the first
-/// four fill half a cache line.
-type Packed = [f64; 4];
+/// How many atoms ahead samples are asked for.
+const AHEAD: usize = 8;
 
 /// The engine that sums over pairs of near atoms, with an analytic gradient.
 ///
@@ -29,13 +41,23 @@ pub struct PairsEngine<'a, const D: usize> {
     potential: &'a ImagePotential<D>,
     weight: &'a ImageWeight<D>,
     distance: &'a NominalDistance<D>,
+    tree: Tree<D>,
+    scaling: Scaling<D>,
+    /// The girth of the tree's boxes when atoms were last put in order.
+    girth: f64,
+    /// The atom at each place of the tree, and, unless that is the caller's order, the place of each atom.
+    order: Vec<u32>,
+    place: Vec<u32>,
     lists: NeighborLists,
-    packed: Vec<Packed>,
+    skin: f64,
+    /// d at the atoms, β at them if it varies, where they were when these were read, if one varies, and
+    /// where they were when the lists were built.
     distances: Vec<f64>,
-    /// β at the atoms; empty where both d and β are constant.
     weights: Vec<f64>,
-    /// Where the atoms were when the lists were built.
+    read: Vec<Point<D>>,
     listed: Vec<Point<D>>,
+    /// The gradient in the tree's order, where that is not the caller's.
+    slopes: Vec<Point<D>>,
 }
 
 impl<'a, const D: usize> PairsEngine<'a, D> {
@@ -49,19 +71,31 @@ impl<'a, const D: usize> PairsEngine<'a, D> {
             potential,
             weight,
             distance,
+            tree: Tree::default(),
+            scaling: Scaling::new(&potential.grid().bounds()),
+            girth: 0.0,
+            order: Vec::new(),
+            place: Vec::new(),
             lists: NeighborLists::default(),
-            packed: Vec::new(),
+            skin: SKIN,
             distances: Vec::new(),
             weights: Vec::new(),
+            read: Vec::new(),
             listed: Vec::new(),
+            slopes: Vec::new(),
         }
     }
 
-    /// The farthest that an atom has moved since the lists were built, over its nominal distance.
-    fn farthest_move(&self, atoms: &[Point<D>]) -> f64 {
+    /// Whether d and β are the same everywhere.
+    fn is_uniform(&self) -> bool {
+        self.distance.is_constant() && self.weight.as_constant().is_some()
+    }
+
+    /// The farthest that an atom has moved from where it was, over its nominal distance.
+    fn farthest_move(&self, atoms: &[Point<D>], from: &[Point<D>]) -> f64 {
         let squared = atoms
             .par_iter()
-            .zip(&self.listed)
+            .zip(from)
             .zip(&self.distances)
             .with_min_len(CHUNK)
             .map(|((p, q), d)| distance_squared(p, q) / (d * d))
@@ -69,202 +103,254 @@ impl<'a, const D: usize> PairsEngine<'a, D> {
         squared.sqrt()
     }
 
-    fn rebuild(&mut self, atoms: &[Point<D>]) {
-        let distance = self.distance;
-        atoms.par_iter().map(|p| distance.at(p)).collect_into_vec(&mut self.distances);
-        if !(self.distance.is_constant() && self.weight.as_constant().is_some()) {
-            let weight = self.weight;
-            atoms.par_iter().map(|p| weight.at(p)).collect_into_vec(&mut self.weights);
+    /// Reads d and β at the atoms.
+    fn read_fields(&mut self, atoms: &[Point<D>]) {
+        let (distance, weight) = (self.distance, self.weight);
+        let chunks = atoms.par_iter().with_min_len(CHUNK);
+        chunks.map(|p| distance.at(p)).collect_into_vec(&mut self.distances);
+        if weight.as_constant().is_none() {
+            let chunks = atoms.par_iter().with_min_len(CHUNK);
+            chunks.map(|p| weight.at(p)).collect_into_vec(&mut self.weights);
         }
-        let scale = pair::CUTOFF + SKIN;
-        let range: Vec<f64> = self.distances.par_iter().map(|d| scale * d).collect();
-        let slope = scale * self.distance.greatest_slope();
-        self.lists.build(atoms, &Reach { range: &range, slope });
+        if !self.is_uniform() {
+            self.read.clear();
+            self.read.extend_from_slice(atoms);
+        }
+    }
+
+    fn rebuild_lists(&mut self, atoms: &[Point<D>]) {
+        let bounds = self.bounds(atoms);
+        self.scaling = Scaling::new(&bounds);
+        if self.order.len() != atoms.len() {
+            // as if the caller's order were compact, until the boxes tell
+            self.order = (0..atoms.len() as u32).collect();
+            self.place.clear();
+            self.girth = cubes_girth(atoms.len(), &bounds, &self.scaling);
+        }
+        self.build_tree(atoms);
+        if self.tree.girth() > LOOSE * self.girth {
+            self.put_in_order(atoms);
+            self.build_tree(atoms);
+            self.girth = self.tree.girth();
+        }
+        self.lists.build(&self.tree, &self.order);
         self.listed.clear();
         self.listed.extend_from_slice(atoms);
     }
 
-    fn pack(&mut self, atoms: &[Point<D>]) {
-        self.packed.resize(atoms.len(), [0.0; 4]);
-        self.packed.par_iter_mut().with_min_len(CHUNK).zip(atoms).zip(&self.distances).for_each(
-            |((packed, p), &d)| {
-                packed[..D].copy_from_slice(p);
-                packed[3] = d;
-            },
-        );
+    /// The box of the atoms.
+    fn bounds(&self, atoms: &[Point<D>]) -> Bounds<D> {
+        let wider = |a: Bounds<D>, b: Bounds<D>| Bounds {
+            min: std::array::from_fn(|k| a.min[k].min(b.min[k])),
+            max: std::array::from_fn(|k| a.max[k].max(b.max[k])),
+        };
+        let chunks = atoms.par_chunks(CHUNK * 8).filter_map(Bounds::of);
+        chunks.reduce_with(wider).unwrap_or_else(|| self.potential.grid().bounds())
+    }
+
+    fn put_in_order(&mut self, atoms: &[Point<D>]) {
+        self.order = compact_order(atoms);
+        self.place.resize(atoms.len(), 0);
+        for (s, &i) in self.order.iter().enumerate() {
+            self.place[i as usize] = s as u32;
+        }
+    }
+
+    fn build_tree(&mut self, atoms: &[Point<D>]) {
+        let Self { tree, order, distances, scaling, skin, .. } = self;
+        let reach = pair::CUTOFF + *skin;
+        tree.build(atoms.len(), |s| {
+            let i = order[s] as usize;
+            (scaling.place(&atoms[i]), scaling.half(reach * distances[i]))
+        });
     }
 
     /// Energy and gradient of one chunk of atoms, each gathering over its own list.
     #[inline(always)]
-    fn gather(&self, first: usize, chunk: &Chunk, gradient: &mut [Point<D>]) -> Energy {
-        match (self.distance.is_constant(), self.weight.as_constant()) {
-            (true, Some(beta)) => self.gather_with(
-                first,
-                chunk,
-                gradient,
-                &Uniform { inverse: 1.0 / self.distance.least(), weight: 1.0 - beta },
-            ),
-            _ => self.gather_with(first, chunk, gradient, &Graded { weights: &self.weights }),
-        }
+    fn gather<L: Lanes>(&self, atoms: &[Point<D>], c: usize, slopes: &mut [Point<D>]) -> Energy {
+        let members = &self.order[c * CHUNK..][..slopes.len()];
+        let image = self.image_part(atoms, members, slopes);
+        let chunk = &self.lists.chunks[c];
+        let atomic = match (self.distance.is_constant(), self.weight.as_constant()) {
+            (true, Some(beta)) => {
+                let inverse_squared = self.distance.least().powi(-2);
+                let scale = Uniform { inverse_squared, weight: 1.0 - beta };
+                add_pairs::<L, _, D>(atoms, members, chunk, &scale, slopes)
+            }
+            (_, beta) => {
+                let (distances, weights) = (&self.distances[..], &self.weights[..]);
+                let scale = Graded { distances, weight: 1.0 - beta.unwrap_or(0.0), weights };
+                add_pairs::<L, _, D>(atoms, members, chunk, &scale, slopes)
+            }
+        };
+        Energy { atomic, image }
     }
 
     /// The same with wider registers. The operations are the same, in the same order, each rounded once,
     /// so the result is the same to the last bit.
     #[cfg(target_arch = "x86_64")]
-    #[target_feature(enable = "avx2")]
-    fn gather_avx2(&self, first: usize, chunk: &Chunk, gradient: &mut [Point<D>]) -> Energy {
-        self.gather(first, chunk, gradient)
+    #[target_feature(enable = "avx2,popcnt")]
+    fn gather_avx2(&self, atoms: &[Point<D>], c: usize, slopes: &mut [Point<D>]) -> Energy {
+        self.gather::<super::lanes::Avx2>(atoms, c, slopes)
     }
 
+    /// The image's part of a chunk: β b, and the gradient. In a loop of its own, so that samples of
+    /// several atoms are on their way at once.
     #[inline(always)]
-    fn gather_with(
-        &self,
-        first: usize,
-        chunk: &Chunk,
-        gradient: &mut [Point<D>],
-        scale: &impl Scale,
-    ) -> Energy {
-        let mut energy = Energy::default();
-        for (a, g) in gradient.iter_mut().enumerate() {
-            let i = first + a;
-            let list = &chunk.neighbors[chunk.starts[a] as usize..chunk.starts[a + 1] as usize];
-            let (pairs, pull) = pairs_of::<D>(&self.packed, i, list, scale);
-            let atom = std::array::from_fn(|k| self.packed[i][k]);
-            let mut slope = [0.0; D];
-            let b = self.potential.value_and_gradient(&atom, &mut slope);
-            let beta = self.weight.as_constant().unwrap_or_else(|| self.weights[i]);
-            energy.atomic += 0.5 * pairs;
-            energy.image += beta * b;
-            *g = std::array::from_fn(|k| pull[k] + beta * slope[k]);
+    fn image_part(&self, atoms: &[Point<D>], members: &[u32], slopes: &mut [Point<D>]) -> f64 {
+        if self.weight.as_constant() == Some(0.0) {
+            slopes.fill([0.0; D]);
+            return 0.0;
+        }
+        let mut energy = 0.0;
+        for (a, (slope, &i)) in slopes.iter_mut().zip(members).enumerate() {
+            if let Some(&ahead) = members.get(a + AHEAD) {
+                self.potential.prefetch(&atoms[ahead as usize]);
+            }
+            let beta = self.weight.as_constant().unwrap_or_else(|| self.weights[i as usize]);
+            energy += beta * self.potential.value_and_gradient(&atoms[i as usize], slope);
+            *slope = slope.map(|g| beta * g);
         }
         energy
     }
-}
 
-/// Neighbours that the inner loop takes at a time.
-const LANES: usize = 8;
-
-/// What scales a pair's distance and energy.
-trait Scale {
-    /// 1/d and the weight 1 − β of the pair.
-    fn of(&self, i: usize, j: usize, packed: &[Packed]) -> (f64, f64);
-}
-
-/// d and β the same everywhere.
-struct Uniform {
-    inverse: f64,
-    weight: f64,
-}
-
-impl Scale for Uniform {
-    #[inline(always)]
-    fn of(&self, _: usize, _: usize, _: &[Packed]) -> (f64, f64) {
-        (self.inverse, self.weight)
-    }
-}
-
-/// d, and β where there are weights, from atom to atom.
-struct Graded<'a> {
-    weights: &'a [f64],
-}
-
-impl Scale for Graded<'_> {
-    #[inline(always)]
-    fn of(&self, i: usize, j: usize, packed: &[Packed]) -> (f64, f64) {
-        let weight = 1.0 - 0.5 * (self.weights[i] + self.weights[j]);
-        (2.0 / (packed[i][3] + packed[j][3]), weight)
-    }
-}
-
-/// Σ w φ(r/d) over the list of atom i, and its gradient: [`LANES`] neighbours side by side, without a
-/// branch on the cut-off.
-#[inline(always)]
-fn pairs_of<const D: usize>(
-    packed: &[Packed],
-    i: usize,
-    list: &[u32],
-    scale: &impl Scale,
-) -> (f64, Point<D>) {
-    let atom = packed[i];
-    let mut energy = [0.0; LANES];
-    let mut pull = [[0.0; LANES]; D];
-    for block in list.chunks(LANES) {
-        // lanes without a neighbour stay beyond the cut-off
-        let mut v = [[FAR; LANES]; D];
-        let (mut inverse, mut weight) = ([1.0; LANES], [0.0; LANES]);
-        for (l, &j) in block.iter().enumerate() {
-            let other = &packed[j as usize];
-            for k in 0..D {
-                v[k][l] = atom[k] - other[k];
-            }
-            (inverse[l], weight[l]) = scale.of(i, j as usize, packed);
-        }
-        for l in 0..LANES {
-            let mut r_squared = 0.0;
-            for axis in &v {
-                r_squared += axis[l] * axis[l];
-            }
-            let u = (r_squared * (inverse[l] * inverse[l])).sqrt();
-            let w = if u < pair::CUTOFF { weight[l] } else { 0.0 };
-            let u = u.min(pair::CUTOFF);
-            energy[l] += w * pair::energy_inside(u);
-            // two atoms at one place push nowhere: v is 0
-            let slope = -w * pair::force_inside(u) / u.max(NEAR) * (inverse[l] * inverse[l]);
-            for k in 0..D {
-                pull[k][l] += slope * v[k][l];
-            }
-        }
-    }
-    (sum(&energy), pull.map(|lanes| sum(&lanes)))
-}
-
-/// Beyond any cut-off, and small enough that its square is finite.
-const FAR: f64 = 1e100;
-/// Below any distance of two atoms that are not at one place.
-const NEAR: f64 = 1e-200;
-
-/// The sum of the lanes, in a fixed order.
-#[inline(always)]
-fn sum(lanes: &[f64; LANES]) -> f64 {
-    let [a, b, c, d, e, f, g, h] = *lanes;
-    ((a + e) + (c + g)) + ((b + f) + (d + h))
-}
-
-impl<const D: usize> Engine<D> for PairsEngine<'_, D> {
-    fn prepare(&mut self, atoms: &[Point<D>], next_move: f64) -> bool {
-        let first = self.listed.len() != atoms.len();
-        if !first && self.farthest_move(atoms) + next_move <= 0.5 * SKIN {
-            return false;
-        }
-        self.rebuild(atoms);
-        first || !self.distance.is_constant() || self.weight.as_constant().is_none()
-    }
-
-    fn evaluate(&mut self, atoms: &[Point<D>], gradient: &mut [Point<D>]) -> Energy {
-        self.pack(atoms);
-        let this = &*self;
+    /// Energy and gradient of all chunks, the gradient in the tree's order.
+    fn gather_all(&self, atoms: &[Point<D>], slopes: &mut [Point<D>]) -> Energy {
         #[cfg(target_arch = "x86_64")]
-        let wide = std::arch::is_x86_feature_detected!("avx2");
-        let parts: Vec<Energy> = gradient
-            .par_chunks_mut(CHUNK)
-            .zip(&this.lists.chunks)
-            .enumerate()
-            .map(|(c, (gradient, chunk))| {
-                #[cfg(target_arch = "x86_64")]
-                if wide {
-                    // SAFETY: the processor has been asked whether it has these instructions.
-                    return unsafe { this.gather_avx2(c * CHUNK, chunk, gradient) };
-                }
-                this.gather(c * CHUNK, chunk, gradient)
-            })
-            .collect();
+        let wide = super::lanes::has_avx2();
+        let gather = |(c, slopes): (usize, &mut [Point<D>])| {
+            #[cfg(target_arch = "x86_64")]
+            if wide {
+                // SAFETY: the processor has been asked whether it has these instructions.
+                return unsafe { self.gather_avx2(atoms, c, slopes) };
+            }
+            self.gather::<Plain>(atoms, c, slopes)
+        };
+        let parts: Vec<Energy> = slopes.par_chunks_mut(CHUNK).enumerate().map(gather).collect();
         parts.iter().fold(Energy::default(), |sum, part| Energy {
             atomic: sum.atomic + part.atomic,
             image: sum.image + part.image,
         })
     }
+}
+
+/// The girth of boxes of eight atoms each, if they were cubes that fill the box.
+fn cubes_girth<const D: usize>(count: usize, bounds: &Bounds<D>, scaling: &Scaling<D>) -> f64 {
+    let blocks = count.div_ceil(LANES) as f64;
+    let sides = bounds.extent().map(|side| f64::from(scaling.half(2.0 * side)));
+    blocks * D as f64 * (sides.iter().product::<f64>() / blocks).powf(1.0 / D as f64)
+}
+
+impl<const D: usize> Engine<D> for PairsEngine<'_, D> {
+    fn prepare(&mut self, atoms: &[Point<D>], next_move: f64) -> bool {
+        let first = self.listed.len() != atoms.len();
+        let farthest = |from| if first { f64::INFINITY } else { self.farthest_move(atoms, from) };
+        let stale = first || !self.is_uniform() && farthest(&self.read) + next_move > STALE;
+        let loose = stale || farthest(&self.listed) + next_move > 0.5 * self.skin;
+        if !loose {
+            return false;
+        }
+        // what cannot be told, or never happens, needs no room
+        self.skin = if next_move < 1.0 { SKIN.max(2.0 * next_move) } else { SKIN };
+        if stale {
+            self.read_fields(atoms);
+        }
+        self.rebuild_lists(atoms);
+        stale
+    }
+
+    fn evaluate(&mut self, atoms: &[Point<D>], gradient: &mut [Point<D>]) -> Energy {
+        assert!(atoms.len() == self.order.len() && gradient.len() == atoms.len(), "not prepared");
+        if self.place.is_empty() {
+            return self.gather_all(atoms, gradient);
+        }
+        let mut slopes = std::mem::take(&mut self.slopes);
+        slopes.resize(atoms.len(), [0.0; D]);
+        let energy = self.gather_all(atoms, &mut slopes);
+        let places = gradient.par_iter_mut().zip(&self.place).with_min_len(CHUNK);
+        places.for_each(|(g, &s)| *g = slopes[s as usize]);
+        self.slopes = slopes;
+        energy
+    }
 
     fn distances(&self) -> &[f64] {
         &self.distances
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use rand::{RngExt, SeedableRng};
+    use rand_pcg::Pcg64;
+
+    use super::*;
+    use crate::image::Grid;
+    use crate::potential::Interpolation;
+
+    /// Calls `check` with an engine prepared for some 3000 atoms, in a compact order or in any, in fields
+    /// that vary or do not.
+    fn with_engines<const D: usize>(
+        check: impl Fn(&mut PairsEngine<'_, D>, &[Point<D>], /* compact */ bool),
+    ) {
+        let grid = Grid { shape: [40; D], step: [1.0; D] };
+        let wave = |i: usize| (0.37 * i as f32).sin();
+        let b = (0..grid.sample_count()).map(wave).collect();
+        let potential = ImagePotential::new(grid, b, Interpolation::Linear).unwrap();
+        let half = (0..grid.sample_count()).map(|i| 0.5 + 0.5 * wave(i)).collect();
+        let weights =
+            [ImageWeight::constant(0.4).unwrap(), ImageWeight::field(grid, half).unwrap()];
+        let field: Vec<f32> =
+            (0..grid.sample_count()).map(|i| 2.0 + 0.04 * (i % 40) as f32).collect();
+        let distances = [
+            NominalDistance::constant(&grid, 2.0).unwrap(),
+            NominalDistance::from_field(&grid, &field, 0.25).unwrap(),
+        ];
+        let mut random = Pcg64::seed_from_u64(5);
+        let atoms: Vec<Point<D>> =
+            (0..3001).map(|_| std::array::from_fn(|_| 39.0 * random.random::<f64>())).collect();
+        let compact: Vec<Point<D>> =
+            compact_order(&atoms).iter().map(|&i| atoms[i as usize]).collect();
+        for (weight, distance) in weights.iter().flat_map(|w| distances.iter().map(move |d| (w, d)))
+        {
+            for (atoms, is_compact) in [(&compact, true), (&atoms, false)] {
+                let mut engine = PairsEngine::new(&potential, weight, distance);
+                engine.prepare(atoms, 0.1);
+                check(&mut engine, atoms, is_compact);
+            }
+        }
+    }
+
+    fn a_compact_order_is_taken_as_it_is<const D: usize>() {
+        with_engines::<D>(|engine, atoms, is_compact| {
+            assert_eq!(engine.place.is_empty(), is_compact);
+            let places = engine.order.iter().zip(0..).filter(|(i, s)| **i == *s).count();
+            assert!((places == atoms.len()) == is_compact);
+        });
+    }
+
+    #[test]
+    fn the_callers_order_is_taken_where_it_is_compact() {
+        a_compact_order_is_taken_as_it_is::<2>();
+        a_compact_order_is_taken_as_it_is::<3>();
+    }
+
+    fn wide_equals_plain<const D: usize>() {
+        with_engines::<D>(|engine, atoms, _| {
+            let mut slopes = vec![[0.0; D]; atoms.len()];
+            let energy = engine.gather_all(atoms, &mut slopes);
+            let mut plain = vec![[0.0; D]; atoms.len()];
+            let parts = plain.chunks_mut(CHUNK).enumerate();
+            let sum = parts.fold(Energy::default(), |sum, (c, plain)| {
+                let part = engine.gather::<Plain>(atoms, c, plain);
+                Energy { atomic: sum.atomic + part.atomic, image: sum.image + part.image }
+            });
+            assert_eq!((energy, slopes), (sum, plain));
+        });
+    }
+
+    #[test]
+    fn wide_registers_give_the_same_bits() {
+        wide_equals_plain::<2>();
+        wide_equals_plain::<3>();
     }
 }
