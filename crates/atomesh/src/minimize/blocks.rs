@@ -49,3 +49,63 @@ pub(super) fn update<T: Send, S: Sync + Copy>(
     }
     target.par_chunks_mut(BLOCK).zip(source.par_chunks(BLOCK)).for_each(|(t, s)| each(t, s));
 }
+
+/// The inner products of each of some vectors with three others, all of one length, in one pass over
+/// memory.
+pub(super) fn dots(vectors: &[&[f32]], others: (&[f32], &[f32], &[f64])) -> Vec<[f64; 3]> {
+    let length = others.0.len();
+    let of_block = |start: usize| {
+        let part = start..(start + BLOCK).min(length);
+        let (a, b, c) = (&others.0[part.clone()], &others.1[part.clone()], &others.2[part.clone()]);
+        vectors.iter().map(|v| three_dots(&v[part.clone()], a, b, c)).collect::<Vec<[f64; 3]>>()
+    };
+    let starts: Vec<usize> = (0..length).step_by(BLOCK).collect();
+    let partial: Vec<Vec<[f64; 3]>> = starts.par_iter().map(|&start| of_block(start)).collect();
+    let mut sums = vec![[0.0; 3]; vectors.len()];
+    for part in &partial {
+        for (sum, term) in sums.iter_mut().zip(part) {
+            (0..3).for_each(|n| sum[n] += term[n]);
+        }
+    }
+    sums
+}
+
+/// The inner products of one vector with three, within a block.
+fn three_dots(v: &[f32], a: &[f32], b: &[f32], c: &[f64]) -> [f64; 3] {
+    let mut lanes = [[0.0f64; 4]; 3];
+    let mut add = |l: usize, v: f32, [a, b, c]: [f64; 3]| {
+        lanes[0][l] += f64::from(v) * a;
+        lanes[1][l] += f64::from(v) * b;
+        lanes[2][l] += f64::from(v) * c;
+    };
+    let (whole, rest) = v.as_chunks::<4>();
+    let fours = whole.iter().zip(a.as_chunks::<4>().0).zip(b.as_chunks::<4>().0);
+    for (((v, a), b), c) in fours.zip(c.as_chunks::<4>().0) {
+        for l in 0..4 {
+            add(l, v[l], [a[l].into(), b[l].into(), c[l]]);
+        }
+    }
+    for (l, &v) in rest.iter().enumerate() {
+        let i = 4 * whole.len() + l;
+        add(l, v, [a[i].into(), b[i].into(), c[i]]);
+    }
+    lanes.map(|[a, b, c, d]| (a + b) + (c + d))
+}
+
+/// Writes the sum of `first`, times its weight, and of the vectors, times theirs, into `target`, in
+/// one pass over memory.
+pub(super) fn combine(
+    target: &mut [f64],
+    (first, weight): (&[f64], f64),
+    vectors: &[(&[f32], f64)],
+) {
+    target.par_chunks_mut(BLOCK).zip(first.par_chunks(BLOCK)).enumerate().for_each(
+        |(b, (target, first))| {
+            target.iter_mut().zip(first).for_each(|(t, x)| *t = weight * x);
+            for (vector, weight) in vectors {
+                let part = &vector[b * BLOCK..][..target.len()];
+                target.iter_mut().zip(part).for_each(|(t, &x)| *t += weight * f64::from(x));
+            }
+        },
+    );
+}
