@@ -24,15 +24,22 @@ use super::image::{ImagePotential, centred_difference};
 
 /// Nominal distances of neighbouring tables differ by this ratio.
 const TABLE_RATIO: f64 = 1.02;
-/// Rows or planes of samples that one thread fills at a time.
-const SLAB: usize = 8;
+/// Samples, at the most but for one plane, that one thread fills at a time: what its cache holds.
+const SLAB: usize = 1 << 17;
+/// Rows of a table are filled up with zeros to multiples of so many samples.
+const LANES: usize = 8;
 
-/// φ(|x|/d) on samples around an atom: rows along x, each for one offset along the other axes.
+/// φ(|x|/d) on samples around an atom: rows along x, each for one offset along the other axes, ordered by
+/// the offset along the last axis.
 struct Table<const D: usize> {
     rows: Vec<Row<D>>,
+    spans: Vec<Span>,
+    /// Where the rows of each offset along the last axis start.
+    planes: Vec<usize>,
     values: Vec<f32>,
-    /// The farthest offset along the last axis.
-    reach: isize,
+    /// The farthest offset along each axis, and along x that with the zeros.
+    reach: [isize; D],
+    padded: isize,
 }
 
 struct Row<const D: usize> {
@@ -41,18 +48,41 @@ struct Row<const D: usize> {
     values: Range<usize>,
 }
 
+/// A row as the inner loop reads it.
+struct Span {
+    /// The offset of the row's first sample in memory.
+    offset: isize,
+    /// Its first value, and how many [`LANES`] of them there are with the zeros.
+    start: u32,
+    count: u32,
+}
+
 impl<const D: usize> Table<D> {
-    fn new(distance: f64, step: &[f64; D]) -> Self {
+    fn new(distance: f64, grid: &Grid<D>) -> Self {
+        let (step, strides) = (&grid.step, grid.strides());
         let radius = pair::CUTOFF * distance;
         let reach: [isize; D] = std::array::from_fn(|k| (radius / step[k]).floor() as isize);
-        let mut table = Self { rows: Vec::new(), values: Vec::new(), reach: reach[D - 1] };
+        let padded = reach[0] + LANES as isize;
+        let mut table = Self {
+            rows: Vec::new(),
+            spans: Vec::new(),
+            planes: vec![0],
+            values: Vec::new(),
+            reach,
+            padded,
+        };
         let row_count: isize = reach[1..].iter().map(|r| 2 * r + 1).product();
+        let mut plane = -reach[D - 1];
         for row in 0..row_count {
             let mut offset = [0; D];
             let mut rest = row;
             for k in 1..D {
                 offset[k] = rest % (2 * reach[k] + 1) - reach[k];
                 rest /= 2 * reach[k] + 1;
+            }
+            if offset[D - 1] > plane {
+                plane = offset[D - 1];
+                table.planes.push(table.rows.len());
             }
             let beside: f64 = (1..D).map(|k| (offset[k] as f64 * step[k]).powi(2)).sum();
             let half = radius * radius - beside;
@@ -66,11 +96,27 @@ impl<const D: usize> Table<D> {
                 let r = (beside + (i as f64 * step[0]).powi(2)).sqrt();
                 pair::energy(r / distance) as f32
             }));
-            table.rows.push(Row { offset, values: start..table.values.len() });
+            let values = start..table.values.len();
+            let count = values.len().div_ceil(LANES);
+            table.values.resize(start + count * LANES, 0.0);
+            let linear = (0..D).map(|k| offset[k] * strides[k] as isize).sum();
+            table.spans.push(Span { offset: linear, start: start as u32, count: count as u32 });
+            table.rows.push(Row { offset, values });
         }
+        table.planes.push(table.rows.len());
         table
     }
+
+    /// The rows at these offsets along the last axis, as far as there are any.
+    fn rows_of(&self, from: isize, to: isize) -> Range<usize> {
+        let reach = self.reach[D - 1];
+        let (from, to) = (from.max(-reach) + reach, to.min(reach + 1) + reach);
+        if from < to { self.planes[from as usize]..self.planes[to as usize] } else { 0..0 }
+    }
 }
+
+/// Atoms that one thread reads the field for at a time.
+const CHUNK: usize = 2048;
 
 /// The engine that accumulates the total potential field on the image's samples.
 ///
@@ -93,10 +139,10 @@ impl<'a, const D: usize> SampledEngine<'a, D> {
     ) -> Self {
         let (least, greatest) = (distance.least(), distance.greatest());
         let count = ((greatest / least).ln() / TABLE_RATIO.ln()).ceil() as usize + 1;
-        let step = &potential.grid().step;
+        let grid = potential.grid();
         let tables = (0..count)
             .into_par_iter()
-            .map(|t| Table::new((least * TABLE_RATIO.powi(t as i32)).min(greatest), step))
+            .map(|t| Table::new((least * TABLE_RATIO.powi(t as i32)).min(greatest), grid))
             .collect();
         Self { potential, weight, distance, tables, field: Vec::new(), distances: Vec::new() }
     }
@@ -108,6 +154,9 @@ impl<'a, const D: usize> SampledEngine<'a, D> {
     }
 
     fn table_of(&self, atom: &Point<D>) -> usize {
+        if self.tables.len() == 1 {
+            return 0;
+        }
         let t = (self.distance.at(atom) / self.distance.least()).ln() / TABLE_RATIO.ln();
         (t.round() as usize).min(self.tables.len() - 1)
     }
@@ -131,10 +180,46 @@ impl<'a, const D: usize> SampledEngine<'a, D> {
         }
         for atom in atoms.near(first_plane, planes) {
             let table = &self.tables[atom.table as usize];
-            for row in &table.rows {
-                self.add_row(slab, first_plane, atom, row, &table.values[row.values.clone()]);
+            let from = first_plane as isize - atom.index[D - 1] as isize;
+            let rows = table.rows_of(from, from + planes as isize);
+            if atom.is_inside(table, &grid.shape) {
+                let centre: usize =
+                    (0..D).map(|k| atom.index[k] as usize * grid.strides()[k]).sum();
+                let (centre, spans) = (centre as isize - start as isize, &table.spans[rows]);
+                add_whole_rows(slab, centre, atom.weight, spans, &table.values);
+            } else {
+                for row in &table.rows[rows] {
+                    self.add_row(slab, first_plane, atom, row, &table.values[row.values.clone()]);
+                }
             }
         }
+    }
+
+    /// Energy and gradient of some atoms: equation (6), and centred differences.
+    fn read(
+        &self,
+        field: &[f32],
+        centres: &[Centre<D>],
+        atoms: &[Point<D>],
+        gradient: &mut [Point<D>],
+    ) -> Energy {
+        let grid = self.potential.grid();
+        let strides = grid.strides();
+        let own = pair::SELF_ENERGY as f32;
+        let mut energy = Energy::default();
+        for ((centre, atom), g) in centres.iter().zip(atoms).zip(gradient) {
+            let at: usize = (0..D).map(|k| centre.index[k] as usize * strides[k]).sum();
+            let image = self.weight.at(atom) * f64::from(self.potential.samples()[at]);
+            let atomic = f64::from(field[at]) - f64::from(centre.weight * own) - image;
+            energy.image += image;
+            energy.atomic += 0.5 * atomic;
+            for k in 0..D {
+                let index = centre.index[k] as usize;
+                let slope = centred_difference(field, at, index, grid.shape[k], strides[k]);
+                g[k] = slope / grid.step[k];
+            }
+        }
+        energy
     }
 
     /// Adds one row of an atom's table, cut to the image and the slab.
@@ -177,6 +262,28 @@ impl<'a, const D: usize> SampledEngine<'a, D> {
     }
 }
 
+/// Adds rows of a table around a centre: none of them leaves the image's rows, nor the slab but by zeros.
+#[inline]
+fn add_whole_rows(slab: &mut [f32], centre: isize, weight: f32, spans: &[Span], values: &[f32]) {
+    for span in spans {
+        let values = values[span.start as usize..].as_chunks::<LANES>().0;
+        let target = &mut slab[(centre + span.offset) as usize..];
+        let whole = target.as_chunks_mut::<LANES>().0;
+        let count = span.count as usize;
+        if whole.len() < count {
+            // the slab's last row ends before the zeros do
+            let values = values[..count].as_flattened();
+            target.iter_mut().zip(values).for_each(|(p, v)| *p += weight * v);
+            continue;
+        }
+        for (target, values) in whole[..count].iter_mut().zip(values) {
+            for l in 0..LANES {
+                target[l] += weight * values[l];
+            }
+        }
+    }
+}
+
 /// An atom at its nearest sample.
 #[derive(Clone, Copy)]
 struct Centre<const D: usize> {
@@ -184,6 +291,17 @@ struct Centre<const D: usize> {
     table: u32,
     /// 1 − β at the atom.
     weight: f32,
+}
+
+impl<const D: usize> Centre<D> {
+    /// Whether the table's rows end within the image's, but for the last axis.
+    fn is_inside(&self, table: &Table<D>, shape: &[usize; D]) -> bool {
+        (0..D - 1).all(|k| {
+            let (at, reach) = (self.index[k] as isize, table.reach[k]);
+            let beyond = if k == 0 { table.padded } else { reach };
+            at >= reach && at + beyond < shape[k] as isize
+        })
+    }
 }
 
 /// The atoms by the plane of their nearest sample.
@@ -195,12 +313,18 @@ struct Centres<const D: usize> {
 }
 
 impl<const D: usize> Centres<D> {
+    /// Counting sort: atoms of a plane keep their order.
     fn new(centres: &[Centre<D>], planes: usize, reach: usize) -> Self {
+        let mut starts = vec![0; planes + 1];
+        centres.iter().for_each(|c| starts[c.index[D - 1] as usize + 1] += 1);
+        (0..planes).for_each(|plane| starts[plane + 1] += starts[plane]);
+        let mut next = starts.clone();
         let mut sorted = centres.to_vec();
-        sorted.sort_by_key(|c| c.index[D - 1]); // stable: atoms of a plane keep their order
-        let starts = (0..=planes)
-            .map(|plane| sorted.partition_point(|c| (c.index[D - 1] as usize) < plane))
-            .collect();
+        for c in centres {
+            let at = &mut next[c.index[D - 1] as usize];
+            sorted[*at] = *c;
+            *at += 1;
+        }
         Self { sorted, starts, reach }
     }
 
@@ -230,7 +354,6 @@ impl<const D: usize> Engine<D> for SampledEngine<'_, D> {
 
     fn evaluate(&mut self, atoms: &[Point<D>], gradient: &mut [Point<D>]) -> Energy {
         let grid = *self.potential.grid();
-        let strides = grid.strides();
         let centres: Vec<Centre<D>> = atoms
             .par_iter()
             .map(|p| Centre {
@@ -241,31 +364,29 @@ impl<const D: usize> Engine<D> for SampledEngine<'_, D> {
                 weight: 1.0 - self.weight.at(p) as f32,
             })
             .collect();
-        let reach = self.tables.iter().map(|t| t.reach).max().unwrap_or(0) as usize;
-        let planes = Centres::new(&centres, grid.shape[D - 1], reach);
+        let reach = self.tables.iter().map(|t| t.reach[D - 1]).max().unwrap_or(0) as usize;
+        let sorted = Centres::new(&centres, grid.shape[D - 1], reach);
         let mut field = std::mem::take(&mut self.field);
         field.resize(grid.sample_count(), 0.0);
         let plane: usize = grid.shape[..D - 1].iter().product();
+        let planes = (SLAB / plane).max(1);
         field
-            .par_chunks_mut(SLAB * plane)
+            .par_chunks_mut(planes * plane)
             .enumerate()
-            .for_each(|(s, slab)| self.fill(slab, s * SLAB, &planes));
-        let own = pair::SELF_ENERGY as f32;
-        let mut energy = Energy::default();
-        for (i, (centre, g)) in centres.iter().zip(gradient.iter_mut()).enumerate() {
-            let at: usize = (0..D).map(|k| centre.index[k] as usize * strides[k]).sum();
-            let image = self.weight.at(&atoms[i]) * f64::from(self.potential.samples()[at]);
-            let atomic = f64::from(field[at]) - f64::from(centre.weight * own) - image;
-            energy.image += image;
-            energy.atomic += 0.5 * atomic;
-            for k in 0..D {
-                let index = centre.index[k] as usize;
-                let slope = centred_difference(&field, at, index, grid.shape[k], strides[k]);
-                g[k] = slope / grid.step[k];
-            }
-        }
+            .for_each(|(s, slab)| self.fill(slab, s * planes, &sorted));
+        let parts: Vec<Energy> = gradient
+            .par_chunks_mut(CHUNK)
+            .enumerate()
+            .map(|(c, gradient)| {
+                let members = c * CHUNK..c * CHUNK + gradient.len();
+                self.read(&field, &centres[members.clone()], &atoms[members], gradient)
+            })
+            .collect();
         self.field = field;
-        energy
+        parts.iter().fold(Energy::default(), |sum, part| Energy {
+            atomic: sum.atomic + part.atomic,
+            image: sum.image + part.image,
+        })
     }
 
     fn distances(&self) -> &[f64] {
