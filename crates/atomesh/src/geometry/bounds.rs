@@ -16,13 +16,17 @@ impl<const D: usize> Bounds<D> {
     pub fn of(points: &[Point<D>]) -> Option<Self> {
         let first = *points.first()?;
         let mut bounds = Self { min: first, max: first };
-        for p in points {
-            for k in 0..D {
-                bounds.min[k] = bounds.min[k].min(p[k]);
-                bounds.max[k] = bounds.max[k].max(p[k]);
-            }
-        }
+        points.iter().for_each(|p| bounds.include(p));
         Some(bounds)
+    }
+
+    /// Widens the box to hold the point.
+    #[inline]
+    pub(crate) fn include(&mut self, p: &Point<D>) {
+        for k in 0..D {
+            self.min[k] = self.min[k].min(p[k]);
+            self.max[k] = self.max[k].max(p[k]);
+        }
     }
 
     /// The lengths of the box along each axis.

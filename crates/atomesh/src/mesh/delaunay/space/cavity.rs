@@ -5,15 +5,29 @@ use super::storage::{Mark, Tetrahedron};
 use crate::geometry::Point;
 
 impl Triangulation {
-    /// Finds all cells in conflict with the vertex, from the one that holds it, and the facets
-    /// around them.
-    pub(super) fn dig(&mut self, vertex: u32, holder: u32) {
-        let p = self.vertices[vertex as usize].at;
+    /// Finds all cells in conflict with `p`, from the one that holds it, and the facets around them.
+    #[inline]
+    pub(super) fn dig(&mut self, p: &Point<3>, holder: u32) {
+        debug_assert!(self.conflicts(&self.tetrahedra.cells[holder as usize], p));
+        self.spread([holder], |triangulation, cell| triangulation.conflicts(cell, p));
+    }
+
+    /// Finds all cells in conflict, from some of them, and the facets around them: `cavity` and
+    /// `boundary`. The cells are marked.
+    #[inline(always)]
+    pub(super) fn spread(
+        &mut self,
+        from: impl IntoIterator<Item = u32>,
+        conflicts: impl Fn(&Self, &Tetrahedron) -> bool,
+    ) {
         self.boundary.clear();
         self.cavity.clear();
-        self.cavity.push(holder);
-        debug_assert!(self.conflicts(&self.tetrahedra.cells[holder as usize], &p));
-        self.tetrahedra.marks[holder as usize] = Mark::Conflict;
+        for cell in from {
+            if self.tetrahedra.marks[cell as usize] != Mark::Conflict {
+                self.tetrahedra.marks[cell as usize] = Mark::Conflict;
+                self.cavity.push(cell);
+            }
+        }
         let mut next = 0;
         while let Some(&cell) = self.cavity.get(next) {
             next += 1;
@@ -22,7 +36,7 @@ impl Triangulation {
                 match self.tetrahedra.marks[neighbour] {
                     Mark::Conflict => {}
                     Mark::Kept => self.boundary.push(facet),
-                    _ if self.conflicts(&self.tetrahedra.cells[neighbour], &p) => {
+                    _ if conflicts(self, &self.tetrahedra.cells[neighbour]) => {
                         self.tetrahedra.marks[neighbour] = Mark::Conflict;
                         self.cavity.push(neighbour as u32);
                     }

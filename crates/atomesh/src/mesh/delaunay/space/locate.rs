@@ -2,15 +2,15 @@
 
 use super::Triangulation;
 use super::storage::FACETS;
+use crate::geometry::Point;
 
 impl Triangulation {
-    /// The finite cell that holds the vertex's point, or an infinite cell whose facet sees it from
-    /// outside. The vertex is not yet inserted.
+    /// The finite cell that holds the point, no vertex, or an infinite cell whose facet sees it from
+    /// outside.
     ///
     /// Steps through any facet that has the point strictly beyond it. In a Delaunay triangulation
     /// no cell is met twice (Edelsbrunner 1990), so the walk ends.
-    pub(super) fn locate(&self, vertex: u32) -> u32 {
-        let p = &self.vertices[vertex as usize].at;
+    pub(super) fn locate(&self, p: &Point<3>) -> u32 {
         let cells = &self.tetrahedra.cells;
         // A walk that starts in an infinite cell goes inside first.
         let start = &cells[self.hint as usize];

@@ -17,50 +17,109 @@
 mod cavity;
 mod fill;
 mod fixed;
+mod join;
 mod locate;
+mod part;
 mod predicates;
+mod seam;
+mod split;
 mod start;
 mod storage;
 
 use super::{STRIDE, rounds};
 use crate::geometry::{Bounds, Point};
-use crate::watch::{Cancelled, Phase, Watch, check};
+use crate::watch::{Cancelled, Watch};
 use fill::Rim;
+use part::Part;
 use predicates::Predicates;
+use rayon::prelude::*;
 use storage::{Tetrahedra, Vertex};
+
+/// A part has at least so many points: the seams of smaller ones would be most of them.
+const LEAST_PART: usize = 4096;
+
+/// More parts than this gain nothing: their seams are connected by one thread.
+const MOST_PARTS: usize = 16;
+
+/// The share of the work that parts can do alone, about.
+const GROWTH: f64 = 0.9;
 
 /// See [`super::Connector`].
 pub(super) fn connect(
     points: &[Point<3>],
     watch: &mut dyn Watch,
 ) -> Result<Option<Vec<u32>>, Cancelled> {
-    connect_in_order(points, rounds::order(points.len()), watch)
+    let most = (points.len() / LEAST_PART).min(MOST_PARTS);
+    connect_in_parts(points, rayon::current_num_threads().min(most), watch)
 }
 
-/// Inserts the points in the given order of their ranks.
-pub(super) fn connect_in_order(
+/// Connects points divided into so many parts, at most.
+pub(super) fn connect_in_parts(
     points: &[Point<3>],
-    mut order: Vec<u32>,
+    part_count: usize,
     watch: &mut dyn Watch,
 ) -> Result<Option<Vec<u32>>, Cancelled> {
-    if !start::bring_simplex_first(points, &mut order) {
-        return Ok(None);
+    let predicates = predicates(points);
+    let start = |ranks: &Vec<u32>| Part::new(points, ranks, rounds::order(ranks.len()), predicates);
+    let whole = || (0..points.len() as u32).collect::<Vec<u32>>();
+    let parts: Option<Vec<Part>> =
+        split::split(points, whole(), part_count).par_iter().map(start).collect();
+    // Points of a part may lie on one plane when others do not.
+    match parts.or_else(|| start(&whole()).map(|part| vec![part])) {
+        Some(parts) => connect_parts(parts, watch).map(Some),
+        None => Ok(None),
     }
-    let mut triangulation = Triangulation::new(points, [order[0], order[1], order[2], order[3]]);
-    let mut done = 0;
-    for ranks in order[4..].chunks(STRIDE) {
-        check(watch, Phase::Connect, done as f64 / order.len() as f64, None)?;
-        for &rank in ranks {
-            triangulation.insert(rank + 1);
+}
+
+/// Inserts the points in the given order of their ranks: the slow twin of insertion by parts.
+#[cfg(test)]
+pub(super) fn connect_in_order(
+    points: &[Point<3>],
+    order: Vec<u32>,
+    watch: &mut dyn Watch,
+) -> Result<Option<Vec<u32>>, Cancelled> {
+    let ranks: Vec<u32> = (0..points.len() as u32).collect();
+    match Part::new(points, &ranks, order, predicates(points)) {
+        Some(part) => connect_parts(vec![part], watch).map(Some),
+        None => Ok(None),
+    }
+}
+
+fn predicates(points: &[Point<3>]) -> Predicates {
+    Predicates::new(Bounds::of(points).map_or([0.0; 3], |bounds| bounds.extent()))
+}
+
+fn connect_parts(mut parts: Vec<Part>, watch: &mut dyn Watch) -> Result<Vec<u32>, Cancelled> {
+    let share = if parts.len() == 1 { 1.0 } else { GROWTH };
+    part::grow(&mut parts, share, watch)?;
+    let triangulations = join::join(parts, share, watch)?;
+    Ok(finite_corners(&triangulations))
+}
+
+/// The corners of all finite cells, four a cell, as ranks.
+fn finite_corners(triangulations: &[Triangulation]) -> Vec<u32> {
+    let counts: Vec<usize> =
+        triangulations.par_iter().map(|one| one.tetrahedra.finite().count()).collect();
+    let mut corners = vec![0; 4 * counts.iter().sum::<usize>()];
+    let mut rest = &mut corners[..];
+    let mut pieces = Vec::new();
+    for (count, triangulation) in counts.into_iter().zip(triangulations) {
+        let (piece, others) = rest.split_at_mut(4 * count);
+        pieces.push((piece, triangulation));
+        rest = others;
+    }
+    pieces.into_par_iter().for_each(|(piece, triangulation)| {
+        let cells = piece.as_chunks_mut::<4>().0;
+        for (place, cell) in cells.iter_mut().zip(triangulation.tetrahedra.finite()) {
+            *place = cell.corners.map(|vertex| triangulation.vertices[vertex as usize].rank);
         }
-        done += ranks.len();
-    }
-    Ok(Some(triangulation.tetrahedra.finite_corners()))
+    });
+    corners
 }
 
 /// The Delaunay tetrahedra of the points inserted so far.
 struct Triangulation {
-    /// The infinite vertex, then the points in prepared order: vertex = rank + 1.
+    /// The infinite vertex, then the points: those of a part in prepared order.
     vertices: Vec<Vertex>,
     tetrahedra: Tetrahedra,
     predicates: Predicates,
@@ -74,15 +133,13 @@ struct Triangulation {
 }
 
 impl Triangulation {
-    fn new(points: &[Point<3>], first: [u32; 4]) -> Self {
-        let extent = Bounds::of(points).map_or([0.0; 3], |bounds| bounds.extent());
-        let vertices: Vec<Vertex> =
-            std::iter::once(&[0.0; 3]).chain(points).map(|&at| Vertex { at, label: 0 }).collect();
-        let tetrahedra = start::first_cells(first.map(|rank| rank + 1), points.len());
+    /// Of four vertices that span a positive cell.
+    fn new(vertices: Vec<Vertex>, first: [u32; 4], predicates: Predicates) -> Self {
+        let tetrahedra = start::first_cells(first, vertices.len());
         Self {
             vertices,
             tetrahedra,
-            predicates: Predicates::new(extent),
+            predicates,
             hint: 0,
             cavity: Vec::new(),
             boundary: Vec::new(),
@@ -91,8 +148,9 @@ impl Triangulation {
     }
 
     fn insert(&mut self, vertex: u32) {
-        let holder = self.locate(vertex);
-        self.dig(vertex, holder);
+        let p = self.vertices[vertex as usize].at;
+        let holder = self.locate(&p);
+        self.dig(&p, holder);
         self.fill(vertex);
     }
 }

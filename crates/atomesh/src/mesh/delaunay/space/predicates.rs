@@ -13,6 +13,7 @@ use robust::{Coord3D, insphere, orient3d};
 const ROUNDING: f64 = f64::EPSILON / 2.0;
 
 /// The error bounds for points in one box, or no further apart than its sides.
+#[derive(Clone, Copy, Debug)]
 pub(super) struct Predicates {
     orientation_bound: f64,
     in_sphere_bound: f64,

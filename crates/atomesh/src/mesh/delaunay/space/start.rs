@@ -1,17 +1,17 @@
 //! The first tetrahedron and the infinite cells around it.
 
 use super::predicates::exact_orientation;
-use super::storage::{FACETS, INFINITE, Tetrahedra};
+use super::storage::{FACETS, INFINITE, Tetrahedra, Vertex};
 use crate::geometry::Point;
 use robust::{Coord, orient2d};
 
 /// Cells for each point, finite and infinite, at random; the arrays grow if there are more.
 const CELLS_A_POINT: usize = 7;
 
-/// Moves the first four points that span a tetrahedron, positive, to the front of the order; false
-/// if all points lie on one plane.
-pub(super) fn bring_simplex_first(points: &[Point<3>], order: &mut [u32]) -> bool {
-    let at = |rank: u32| &points[rank as usize];
+/// Moves the first four vertices that span a tetrahedron, positive, to the front of the order; false
+/// if all lie on one plane.
+pub(super) fn bring_simplex_first(vertices: &[Vertex], order: &mut [u32]) -> bool {
+    let at = |vertex: u32| &vertices[vertex as usize].at;
     let Some(third) =
         (2..order.len()).find(|&k| !are_collinear([at(order[0]), at(order[1]), at(order[k])]))
     else {

@@ -25,12 +25,13 @@ pub(super) enum Mark {
     Free,
 }
 
-/// A point and a place for a passing note.
+/// A point, its rank in the prepared order, and a place for a passing note.
 #[derive(Clone, Copy, Debug)]
 #[repr(align(32))]
 pub(super) struct Vertex {
     pub at: Point<3>,
-    /// Where the vertex stood in the latest rim that it was in; see [`super::fill`].
+    pub rank: u32,
+    /// Where the vertex stood in the latest list that it was in; see [`super::fill`].
     pub label: u32,
 }
 
@@ -79,16 +80,9 @@ impl Tetrahedra {
         self.free.push(place);
     }
 
-    /// The corners of all finite cells, four a cell, as ranks.
-    pub fn finite_corners(self) -> Vec<u32> {
-        let finite = || {
-            let live = self.cells.iter().zip(&self.marks).filter(|(_, mark)| **mark != Mark::Free);
-            live.map(|(cell, _)| cell).filter(|cell| !cell.is_infinite())
-        };
-        let mut corners = Vec::with_capacity(4 * finite().count());
-        for cell in finite() {
-            corners.extend(cell.corners.map(|vertex| vertex - 1));
-        }
-        corners
+    /// All finite cells.
+    pub fn finite(&self) -> impl Iterator<Item = &Tetrahedron> {
+        let live = self.cells.iter().zip(&self.marks).filter(|(_, mark)| **mark != Mark::Free);
+        live.map(|(cell, _)| cell).filter(|cell| !cell.is_infinite())
     }
 }

@@ -1,0 +1,151 @@
+//! Parts triangulated alone become the triangulation of all points.
+//!
+//! 1. In each part but the first, the cells that other parts' points may be in conflict with are
+//!    loosened ([`super::seam`]); the others are final, being Delaunay cells of all points.
+//! 2. The first part takes the vertices of the loose cells of the others as its own. A vertex that it
+//!    does not take has final cells alone around it, the same as among all points. So every cell of
+//!    the whole that is not final in another part has only vertices that the first now has, and is
+//!    one of its cells.
+//! 3. The facets between loose and final cells are found in the first part. What lies beyond them in
+//!    it is the region of the final cells of others, and is removed ([`Triangulation::cut`]).
+//!
+//! The Delaunay triangulation is unique, its ties broken by coordinates alone, so the cells are those
+//! of one triangulation, whatever the parts. Where everything is seam, as on a sphere, all points are
+//! inserted in the first part in the end.
+
+use super::part::Part;
+use super::storage::{FACETS, INFINITE, Mark};
+use super::{STRIDE, Triangulation, rounds};
+use crate::geometry::Bounds;
+use crate::watch::{Cancelled, Phase, Watch, check};
+use rayon::prelude::*;
+
+/// A facet on the border between final cells of other parts and the rest.
+struct Border {
+    /// Its vertices in the first part, ascending.
+    vertices: [u32; 3],
+    /// Whether sorting them took an odd number of swaps, as seen from the final cell.
+    odd: bool,
+}
+
+/// The triangulations of the parts, without the cells that are not of the whole. Work is reported
+/// from `share` on.
+pub(super) fn join(
+    mut parts: Vec<Part>,
+    share: f64,
+    watch: &mut dyn Watch,
+) -> Result<Vec<Triangulation>, Cancelled> {
+    let boxes: Vec<Bounds<3>> = parts.iter().map(|part| part.bounds).collect();
+    parts.par_iter_mut().enumerate().skip(1).for_each(|(index, part)| {
+        let others: Vec<Bounds<3>> = boxes
+            .iter()
+            .enumerate()
+            .filter(|other| other.0 != index)
+            .map(|other| *other.1)
+            .collect();
+        part.triangulation.loosen(&others);
+    });
+    let mut triangulations = parts.into_iter().map(|part| part.triangulation).collect::<Vec<_>>();
+    let (first, others) = triangulations.split_first_mut().expect("there is a part");
+    let mut border = Vec::new();
+    let mut added = Vec::new();
+    for other in others {
+        added.extend(first.take_seam(other, &mut border));
+    }
+    for (chunk, vertices) in added.chunks(STRIDE).enumerate() {
+        let done = (chunk * STRIDE) as f64 / added.len() as f64;
+        check(watch, Phase::Connect, share + (1.0 - share) * done, None)?;
+        vertices.iter().for_each(|&vertex| first.insert(vertex));
+    }
+    first.cut(border);
+    Ok(triangulations)
+}
+
+impl Triangulation {
+    /// Takes the vertices of the other's loose cells and gives them in order of insertion; the loose
+    /// cells are freed.
+    fn take_seam(&mut self, other: &mut Self, border: &mut Vec<Border>) -> Vec<u32> {
+        let mut seam: Vec<u32> = Vec::new();
+        for &cell in &other.cavity {
+            for vertex in other.tetrahedra.cells[cell as usize].corners {
+                let label = &mut other.vertices[vertex as usize].label;
+                // A label is a note that may be stale: the list tells.
+                if vertex != INFINITE && seam.get(*label as usize) != Some(&vertex) {
+                    *label = seam.len() as u32;
+                    seam.push(vertex);
+                }
+            }
+            other.tetrahedra.release(cell);
+        }
+        seam.sort_unstable();
+        let base = self.vertices.len() as u32;
+        for (place, &vertex) in seam.iter().enumerate() {
+            let vertex = &mut other.vertices[vertex as usize];
+            self.vertices.push(*vertex);
+            vertex.label = base + place as u32;
+        }
+        other.vertices[INFINITE as usize].label = INFINITE;
+        for &facet in &other.boundary {
+            let corners = other.tetrahedra.cells[(facet >> 2) as usize].corners;
+            let facet = FACETS[(facet & 3) as usize].map(|k| corners[k]);
+            let (vertices, odd) = sorted(facet.map(|v| other.vertices[v as usize].label));
+            border.push(Border { vertices, odd });
+        }
+        rounds::order(seam.len()).into_iter().map(|place| base + place).collect()
+    }
+
+    /// Removes the cells beyond the border, on the side of its final cells.
+    fn cut(&mut self, mut border: Vec<Border>) {
+        border.sort_unstable_by_key(|facet| facet.vertices);
+        let mut is_border = vec![false; self.vertices.len()];
+        border.iter().flat_map(|facet| facet.vertices).for_each(|v| is_border[v as usize] = true);
+        let beyond: Vec<u32> = (0..self.tetrahedra.cells.len())
+            .into_par_iter()
+            .flat_map_iter(|cell| self.facets_beyond(cell, &border, &is_border))
+            .collect();
+        assert_eq!(beyond.len(), border.len(), "every facet of the border is a facet of the seam");
+        let mut stack = Vec::new();
+        for facet in &beyond {
+            self.tetrahedra.cells[(facet >> 2) as usize].neighbours[(facet & 3) as usize] =
+                u32::MAX;
+            stack.push(facet >> 2);
+        }
+        while let Some(cell) = stack.pop() {
+            if self.tetrahedra.marks[cell as usize] == Mark::Free {
+                continue;
+            }
+            self.tetrahedra.release(cell);
+            let inner = self.tetrahedra.cells[cell as usize].neighbours;
+            stack.extend(inner.into_iter().filter(|&f| f != u32::MAX).map(|facet| facet >> 2));
+        }
+    }
+
+    /// The facets of a cell that are on the border, if the cell is beyond it.
+    fn facets_beyond(
+        &self,
+        cell: usize,
+        border: &[Border],
+        is_border: &[bool],
+    ) -> impl Iterator<Item = u32> {
+        let corners = self.tetrahedra.cells[cell].corners;
+        let count = corners.iter().filter(|&&corner| is_border[corner as usize]).count();
+        let live = count >= 3 && self.tetrahedra.marks[cell] != Mark::Free;
+        (0..4)
+            .filter(move |&k| {
+                let facet = FACETS[k].map(|corner| corners[corner]);
+                live && facet.iter().all(|&v| is_border[v as usize]) && {
+                    let (vertices, odd) = sorted(facet);
+                    let found = border.binary_search_by_key(&vertices, |facet| facet.vertices);
+                    found.is_ok_and(|at| border[at].odd == odd)
+                }
+            })
+            .map(move |k| 4 * cell as u32 + k as u32)
+    }
+}
+
+/// Three vertices in ascending order, and whether this took an odd number of swaps.
+fn sorted([a, b, c]: [u32; 3]) -> ([u32; 3], bool) {
+    let mut sorted = [a, b, c];
+    sorted.sort_unstable();
+    (sorted, (a > b) ^ (b > c) ^ (a > c))
+}
