@@ -101,30 +101,28 @@ const STRIDE: usize = 4096;
 
 /// Makes cells of prepared points; `None` if all lie on one line (2-D) or plane (3-D).
 ///
-/// Returns the corners, ranks in the prepared order, `D + 1` a cell, in any order and orientation
-/// positive.
+/// Returns the corners, as the caller's indices, `D + 1` a cell, in the order of
+/// [`canonical::arrange`] and orientation positive.
 type Connector<const D: usize> =
-    fn(&[Point<D>], &mut dyn Watch) -> Result<Option<Vec<u32>>, Cancelled>;
+    fn(&Prepared<D>, &mut dyn Watch) -> Result<Option<Vec<u32>>, Cancelled>;
 
 /// Connects points to a [`Mesh`] by Delaunay's rule.
 #[derive(Clone, Copy, Debug)]
 pub struct Delaunay<const D: usize> {
     connector: Connector<D>,
-    /// [`canonical::arrange`] for cells of `D + 1` corners.
-    arrange: fn(Vec<u32>, usize) -> Vec<u32>,
 }
 
 impl Delaunay<2> {
     /// Triangles, by the crate `spade`.
     pub fn new() -> Self {
-        Self { connector: plane::connect, arrange: canonical::arrange::<3> }
+        Self { connector: plane::connect }
     }
 }
 
 impl Delaunay<3> {
-    /// Tetrahedra, by incremental insertion (Bowyer 1981, Watson 1981).
+    /// Tetrahedra, by incremental insertion (Bowyer 1981, Watson 1981), on all threads.
     pub fn new() -> Self {
-        Self { connector: space::connect, arrange: canonical::arrange::<4> }
+        Self { connector: space::connect }
     }
 }
 
@@ -161,13 +159,9 @@ impl<const D: usize> Delaunay<D> {
     ) -> Result<Mesh<D>, ConnectError> {
         check(watch, Phase::Connect, 0.0, None)?;
         let prepared = Prepared::new(points)?;
-        let corners = (self.connector)(&prepared.points, watch)?
+        let corners = (self.connector)(&prepared, watch)?
             .ok_or(ConnectError::Flat { count: points.len(), dimension: D })?;
         check(watch, Phase::Connect, 1.0, None)?;
-        let mut corners = (self.arrange)(corners, points.len());
-        for corner in &mut corners {
-            *corner = prepared.order[*corner as usize];
-        }
         Ok(Mesh::new(points.to_vec(), corners)?)
     }
 }

@@ -7,7 +7,7 @@ use rand::{RngExt, SeedableRng};
 use rand_pcg::Pcg64Mcg;
 use std::ops::ControlFlow;
 
-fn scatter<const D: usize>(count: usize, seed: u64) -> Vec<Point<D>> {
+pub(super) fn scatter<const D: usize>(count: usize, seed: u64) -> Vec<Point<D>> {
     let mut random = Pcg64Mcg::seed_from_u64(seed);
     (0..count).map(|_| std::array::from_fn(|_| random.random::<f64>())).collect()
 }
@@ -39,21 +39,30 @@ fn hexagonal(cells: usize) -> Vec<Point<2>> {
     crystal(&[[0.0, 0.0], [HALF, HALF]], [1.0, 3.0_f64.sqrt()], cells)
 }
 
-fn cubic(cells: usize) -> Vec<Point<3>> {
+pub(super) fn cubic(cells: usize) -> Vec<Point<3>> {
     crystal(&[[0.0; 3]], [1.0; 3], cells)
 }
 
-fn body_centered(cells: usize) -> Vec<Point<3>> {
+pub(super) fn body_centered(cells: usize) -> Vec<Point<3>> {
     crystal(&[[0.0; 3], [HALF; 3]], [1.0; 3], cells)
 }
 
-fn face_centered(cells: usize) -> Vec<Point<3>> {
+pub(super) fn face_centered(cells: usize) -> Vec<Point<3>> {
     let sites = [[0.0; 3], [HALF, HALF, 0.0], [HALF, 0.0, HALF], [0.0, HALF, HALF]];
     crystal(&sites, [1.0; 3], cells)
 }
 
-fn scaled<const D: usize>(points: &[Point<D>], factor: f64) -> Vec<Point<D>> {
+pub(super) fn scaled<const D: usize>(points: &[Point<D>], factor: f64) -> Vec<Point<D>> {
     points.iter().map(|p| p.map(|x| x * factor)).collect()
+}
+
+/// Each point moved by up to half the amount along each axis.
+pub(super) fn jittered(points: &[Point<3>], amount: f64) -> Vec<Point<3>> {
+    let shifts = scatter::<3>(points.len(), 3);
+    let moved = |(p, shift): (&Point<3>, &Point<3>)| {
+        std::array::from_fn(|k| p[k] + amount * (shift[k] - 0.5))
+    };
+    points.iter().zip(&shifts).map(moved).collect()
 }
 
 /// Connects and checks all promises; the hull is checked against `volume`, if known.
@@ -136,17 +145,11 @@ fn scattered_and_jittered_points_connect_soundly() {
     connect_soundly(Delaunay::<2>::new(), &scatter(2000, 1), None);
     connect_soundly(Delaunay::<3>::new(), &scatter(2000, 2), None);
     for amount in [0.1, 1e-3, 1e-9, 1e-15] {
-        let shifts = scatter::<3>(1000, 3);
-        let jittered: Vec<Point<3>> = face_centered(4)
-            .iter()
-            .zip(&shifts)
-            .map(|(p, s)| std::array::from_fn(|k| p[k] + amount * (s[k] - 0.5)))
-            .collect();
-        connect_soundly(Delaunay::<3>::new(), &jittered, None);
+        connect_soundly(Delaunay::<3>::new(), &jittered(&face_centered(4), amount), None);
     }
 }
 
-fn on_the_unit_sphere(count: usize, seed: u64) -> Vec<Point<3>> {
+pub(super) fn on_the_unit_sphere(count: usize, seed: u64) -> Vec<Point<3>> {
     let normalized = |p: &Point<3>| {
         let v = p.map(|x| x - 0.5);
         let length = crate::geometry::dot(&v, &v).sqrt();
@@ -206,9 +209,8 @@ fn long_thin_and_graded_clouds_connect_soundly() {
     connect_soundly(Delaunay::<3>::new(), &far, Some(27.0));
 }
 
-#[test]
-fn exactly_cospherical_points_connect_soundly() {
-    // Integer points at distance 15 from the origin, by x² + y² + z² = 225.
+/// Integer points at distance 15 from the origin, by x² + y² + z² = 225.
+pub(super) fn cospherical_integers() -> Vec<Point<3>> {
     let mut points = Vec::new();
     for x in -15_i32..=15 {
         for y in -15_i32..=15 {
@@ -219,6 +221,12 @@ fn exactly_cospherical_points_connect_soundly() {
             }
         }
     }
+    points
+}
+
+#[test]
+fn exactly_cospherical_points_connect_soundly() {
+    let mut points = cospherical_integers();
     connect_soundly(Delaunay::<3>::new(), &points, None);
     points.push([0.0; 3]);
     connect_soundly(Delaunay::<3>::new(), &points, None);
@@ -283,7 +291,7 @@ fn signed_zeros_are_equal() {
 }
 
 /// Breaks at the call of this number.
-struct Stop(usize);
+pub(super) struct Stop(pub usize);
 
 impl Watch for Stop {
     fn step(&mut self, phase: Phase, done: f64, _: Option<f64>) -> ControlFlow<()> {
@@ -404,8 +412,7 @@ fn perturbation_makes_cells_independent_of_the_order_of_insertion() {
     for points in [cubic(4), face_centered(3), body_centered(3)] {
         let mut order: Vec<u32> = (0..points.len() as u32).collect();
         let cells = |order: &[u32]| {
-            let cells = space::connect_in_order(&points, order.to_vec(), &mut Silent);
-            canonical::arrange::<4>(cells.unwrap().unwrap(), points.len())
+            space::connect_in_order(&points, order.to_vec(), &mut Silent).unwrap().unwrap()
         };
         let expected = cells(&order);
         for seed in 0..5 {
@@ -415,7 +422,7 @@ fn perturbation_makes_cells_independent_of_the_order_of_insertion() {
     }
 }
 
-fn small_integers<const D: usize>() -> impl Strategy<Value = Vec<Point<D>>> {
+pub(super) fn small_integers<const D: usize>() -> impl Strategy<Value = Vec<Point<D>>> {
     let point =
         prop::collection::vec(0_u8..4, D).prop_map(|p| std::array::from_fn(|k| f64::from(p[k])));
     prop::collection::vec(point, 0..40).prop_map(|points| merge_duplicates(&points).0)

@@ -35,6 +35,9 @@ pub(super) fn join(
     share: f64,
     watch: &mut dyn Watch,
 ) -> Result<Vec<Triangulation>, Cancelled> {
+    if parts.len() == 1 {
+        return Ok(parts.into_iter().map(|part| part.triangulation).collect());
+    }
     let boxes: Vec<Bounds<3>> = parts.iter().map(|part| part.bounds).collect();
     parts.par_iter_mut().enumerate().skip(1).for_each(|(index, part)| {
         let others: Vec<Bounds<3>> = boxes

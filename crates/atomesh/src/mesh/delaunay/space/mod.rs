@@ -25,15 +25,18 @@ mod seam;
 mod split;
 mod start;
 mod storage;
+#[cfg(test)]
+mod tests;
 
-use super::{STRIDE, rounds};
+use super::prepare::Prepared;
+use super::{STRIDE, canonical, rounds};
 use crate::geometry::{Bounds, Point};
 use crate::watch::{Cancelled, Watch};
 use fill::Rim;
 use part::Part;
 use predicates::Predicates;
 use rayon::prelude::*;
-use storage::{Tetrahedra, Vertex};
+use storage::{Mark, Tetrahedra, Vertex};
 
 /// A part has at least so many points: the seams of smaller ones would be most of them.
 const LEAST_PART: usize = 4096;
@@ -46,19 +49,20 @@ const GROWTH: f64 = 0.9;
 
 /// See [`super::Connector`].
 pub(super) fn connect(
-    points: &[Point<3>],
+    prepared: &Prepared<3>,
     watch: &mut dyn Watch,
 ) -> Result<Option<Vec<u32>>, Cancelled> {
-    let most = (points.len() / LEAST_PART).min(MOST_PARTS);
-    connect_in_parts(points, rayon::current_num_threads().min(most), watch)
+    let most = (prepared.points.len() / LEAST_PART).min(MOST_PARTS);
+    connect_in_parts(prepared, rayon::current_num_threads().min(most), watch)
 }
 
 /// Connects points divided into so many parts, at most.
 pub(super) fn connect_in_parts(
-    points: &[Point<3>],
+    prepared: &Prepared<3>,
     part_count: usize,
     watch: &mut dyn Watch,
 ) -> Result<Option<Vec<u32>>, Cancelled> {
+    let points = &prepared.points;
     let predicates = predicates(points);
     let start = |ranks: &Vec<u32>| Part::new(points, ranks, rounds::order(ranks.len()), predicates);
     let whole = || (0..points.len() as u32).collect::<Vec<u32>>();
@@ -66,12 +70,12 @@ pub(super) fn connect_in_parts(
         split::split(points, whole(), part_count).par_iter().map(start).collect();
     // Points of a part may lie on one plane when others do not.
     match parts.or_else(|| start(&whole()).map(|part| vec![part])) {
-        Some(parts) => connect_parts(parts, watch).map(Some),
+        Some(parts) => connect_parts(parts, &prepared.order, watch).map(Some),
         None => Ok(None),
     }
 }
 
-/// Inserts the points in the given order of their ranks: the slow twin of insertion by parts.
+/// Inserts the points one by one in the given order: the slow twin of insertion by parts.
 #[cfg(test)]
 pub(super) fn connect_in_order(
     points: &[Point<3>],
@@ -80,7 +84,7 @@ pub(super) fn connect_in_order(
 ) -> Result<Option<Vec<u32>>, Cancelled> {
     let ranks: Vec<u32> = (0..points.len() as u32).collect();
     match Part::new(points, &ranks, order, predicates(points)) {
-        Some(part) => connect_parts(vec![part], watch).map(Some),
+        Some(part) => connect_parts(vec![part], &ranks, watch).map(Some),
         None => Ok(None),
     }
 }
@@ -89,32 +93,18 @@ fn predicates(points: &[Point<3>]) -> Predicates {
     Predicates::new(Bounds::of(points).map_or([0.0; 3], |bounds| bounds.extent()))
 }
 
-fn connect_parts(mut parts: Vec<Part>, watch: &mut dyn Watch) -> Result<Vec<u32>, Cancelled> {
+fn connect_parts(
+    mut parts: Vec<Part>,
+    order: &[u32],
+    watch: &mut dyn Watch,
+) -> Result<Vec<u32>, Cancelled> {
     let share = if parts.len() == 1 { 1.0 } else { GROWTH };
     part::grow(&mut parts, share, watch)?;
     let triangulations = join::join(parts, share, watch)?;
-    Ok(finite_corners(&triangulations))
-}
-
-/// The corners of all finite cells, four a cell, as ranks.
-fn finite_corners(triangulations: &[Triangulation]) -> Vec<u32> {
-    let counts: Vec<usize> =
-        triangulations.par_iter().map(|one| one.tetrahedra.finite().count()).collect();
-    let mut corners = vec![0; 4 * counts.iter().sum::<usize>()];
-    let mut rest = &mut corners[..];
-    let mut pieces = Vec::new();
-    for (count, triangulation) in counts.into_iter().zip(triangulations) {
-        let (piece, others) = rest.split_at_mut(4 * count);
-        pieces.push((piece, triangulation));
-        rest = others;
-    }
-    pieces.into_par_iter().for_each(|(piece, triangulation)| {
-        let cells = piece.as_chunks_mut::<4>().0;
-        for (place, cell) in cells.iter_mut().zip(triangulation.tetrahedra.finite()) {
-            *place = cell.corners.map(|vertex| triangulation.vertices[vertex as usize].rank);
-        }
-    });
-    corners
+    let corners = canonical::arrange(&triangulations, order);
+    // Memory is given back in parallel too.
+    triangulations.into_par_iter().for_each(drop);
+    Ok(corners)
 }
 
 /// The Delaunay tetrahedra of the points inserted so far.
@@ -152,5 +142,18 @@ impl Triangulation {
         let holder = self.locate(&p);
         self.dig(&p, holder);
         self.fill(vertex);
+    }
+}
+
+impl canonical::Cells<4> for Triangulation {
+    fn place_count(&self) -> usize {
+        self.tetrahedra.cells.len()
+    }
+
+    #[inline]
+    fn corners(&self, place: usize) -> Option<[u32; 4]> {
+        let cell = &self.tetrahedra.cells[place];
+        let is_finite = self.tetrahedra.marks[place] != Mark::Free && !cell.is_infinite();
+        is_finite.then(|| cell.corners.map(|vertex| self.vertices[vertex as usize].rank))
     }
 }

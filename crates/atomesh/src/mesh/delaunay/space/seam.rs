@@ -94,3 +94,46 @@ fn cross(u: &Point<3>, v: &Point<3>) -> Point<3> {
         u[i] * v[j] - u[j] * v[i]
     })
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::geometry::Simplex;
+    use crate::mesh::delaunay::tests::{jittered, scatter};
+
+    /// Checks that no point of which a ball is clear lies in the exact circumsphere, and counts
+    /// those that lie outside and are not seen to.
+    fn unseen(cell: [Point<3>; 4], points: &[Point<3>]) -> usize {
+        let ball = Ball::around([&cell[0], &cell[1], &cell[2], &cell[3]]);
+        let mut simplex = Simplex { first: cell[0], others: [cell[1], cell[2], cell[3]] };
+        if simplex.orientation() < 0.0 {
+            simplex.others.swap(0, 1);
+        }
+        let outside = |p: &&Point<3>| {
+            let bounds = Bounds { min: **p, max: **p };
+            let clear = ball.is_clear_of(&bounds);
+            assert!(!clear || simplex.in_sphere(p) < 0.0, "{cell:?} {p:?}");
+            !clear && simplex.in_sphere(p) < 0.0
+        };
+        points.iter().filter(outside).count()
+    }
+
+    #[test]
+    fn a_ball_that_is_clear_of_a_point_has_it_outside() {
+        let square = [[0.25, 0.25, 0.5], [0.75, 0.25, 0.5], [0.75, 0.75, 0.5], [0.25, 0.75, 0.5]];
+        let mut points = scatter::<3>(200, 1);
+        points.extend(jittered(&square, 1e-15));
+        for cell in scatter::<3>(400, 2).as_chunks::<4>().0 {
+            // Rounding leaves nothing open at this size.
+            assert_eq!(unseen(*cell, &points), 0, "{cell:?}");
+        }
+        // Flat cells, in which rounding plays the larger part.
+        for exponent in 1..17 {
+            let flat = jittered(&square, 10.0_f64.powi(-exponent));
+            unseen([flat[0], flat[1], flat[2], flat[3]], &points);
+        }
+        assert!(
+            Ball::around([&square[0], &square[1], &square[2], &square[3]]).radius.is_infinite()
+        );
+    }
+}

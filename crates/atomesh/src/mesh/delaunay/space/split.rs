@@ -62,3 +62,48 @@ fn divide(points: &[Point<3>], ranks: &[u32], share: f64) -> Option<(Vec<u32>, V
         x < plane || with_plane && x == plane
     }))
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::mesh::delaunay::tests::{cubic, scatter};
+
+    fn boxes(points: &[Point<3>], parts: &[Vec<u32>]) -> Vec<Bounds<3>> {
+        let of = |part: &Vec<u32>| {
+            let points: Vec<Point<3>> = part.iter().map(|&rank| points[rank as usize]).collect();
+            Bounds::of(&points).unwrap()
+        };
+        parts.iter().map(of).collect()
+    }
+
+    #[test]
+    fn parts_hold_all_points_about_evenly_in_boxes_apart() {
+        for points in [scatter::<3>(5000, 1), cubic(16)] {
+            for count in 1..=9 {
+                let parts = split(&points, (0..points.len() as u32).collect(), count);
+                assert_eq!(parts.len(), count);
+                for (i, one) in boxes(&points, &parts).iter().enumerate() {
+                    assert!(parts[i].is_sorted());
+                    for other in &boxes(&points, &parts)[i + 1..] {
+                        let apart =
+                            |k: usize| one.max[k] < other.min[k] || other.max[k] < one.min[k];
+                        assert!((0..3).any(apart), "{one:?} {other:?}");
+                    }
+                    // A plane of the crystal has 1/17 of its points.
+                    let share = parts[i].len() * count;
+                    assert!(share.abs_diff(points.len()) < points.len() / 2, "{share}");
+                }
+                let mut all = parts.concat();
+                all.sort_unstable();
+                assert!(all.iter().copied().eq(0..points.len() as u32));
+            }
+        }
+    }
+
+    #[test]
+    fn points_on_one_plane_across_their_longest_side_stay_together() {
+        let points = [[0.0, 0.0, 1.0]; 3];
+        assert_eq!(split(&points, vec![0, 1, 2], 4), [vec![0, 1, 2]]);
+        assert!(split(&[], vec![], 4).concat().is_empty());
+    }
+}

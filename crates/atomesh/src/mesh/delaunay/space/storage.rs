@@ -79,10 +79,4 @@ impl Tetrahedra {
         self.marks[place as usize] = Mark::Free;
         self.free.push(place);
     }
-
-    /// All finite cells.
-    pub fn finite(&self) -> impl Iterator<Item = &Tetrahedron> {
-        let live = self.cells.iter().zip(&self.marks).filter(|(_, mark)| **mark != Mark::Free);
-        live.map(|(cell, _)| cell).filter(|cell| !cell.is_infinite())
-    }
 }

@@ -1,0 +1,128 @@
+//! Parts connected in parallel give the cells of one insertion of all points.
+
+use super::*;
+use crate::mesh::{Delaunay, merge_duplicates};
+use crate::mesh::delaunay::tests::*;
+use crate::watch::Silent;
+use proptest::prelude::*;
+
+fn assert_parts_change_nothing(points: &[Point<3>], what: &str) {
+    let prepared = Prepared::new(points).unwrap();
+    let connected = |parts| connect_in_parts(&prepared, parts, &mut Silent).unwrap();
+    let expected = connected(1);
+    for parts in [2, 3, 4, 7] {
+        assert_eq!(connected(parts), expected, "{what} in {parts} parts");
+    }
+}
+
+#[test]
+fn crystals_connect_alike_in_parts() {
+    for (points, what) in [
+        (cubic(7), "cubic"),
+        (body_centered(5), "body-centred"),
+        (face_centered(4), "face-centred"),
+    ] {
+        for scale in [1.0, 0.1, 1e9, 1e-9] {
+            let points = scaled(&points, scale);
+            assert_parts_change_nothing(&points, &format!("{what} times {scale}"));
+        }
+        let turned: Vec<Point<3>> = points
+            .iter()
+            .map(|p| [0.8 * p[0] - 0.6 * p[1], 0.6 * p[0] + 0.8 * p[1], p[2]])
+            .collect();
+        assert_parts_change_nothing(&turned, &format!("{what}, turned"));
+        for amount in [0.1, 1e-9, 1e-15] {
+            let jittered = jittered(&points, amount);
+            assert_parts_change_nothing(&jittered, &format!("{what}, jittered by {amount}"));
+        }
+    }
+}
+
+#[test]
+fn clouds_connect_alike_in_parts() {
+    let cloud = scatter::<3>(3000, 21);
+    assert_parts_change_nothing(&cloud, "scattered");
+    let changed = |change: &dyn Fn(&Point<3>) -> Point<3>| cloud.iter().map(change).collect();
+    let long: Vec<_> = changed(&|p| [1e4 * p[0], p[1], 1e-3 * p[2]]);
+    assert_parts_change_nothing(&long, "long");
+    let graded: Vec<_> = changed(&|p| p.map(|x| x.powi(8)));
+    assert_parts_change_nothing(&graded, "graded");
+    let clusters: Vec<_> = changed(&|p| p.map(|x| (4.0 * x).floor() + 1e-3 * x));
+    assert_parts_change_nothing(&clusters, "clustered");
+    let plates: Vec<_> = changed(&|p| [p[0], p[1], (3.0 * p[2]).floor()]);
+    assert_parts_change_nothing(&plates, "on three planes");
+    let coarse: Vec<_> = changed(&|p| p.map(|x| (20.0 * x).floor()));
+    assert_parts_change_nothing(&merge_duplicates(&coarse).0, "small integers");
+}
+
+#[test]
+fn surfaces_connect_alike_in_parts() {
+    // Every circumsphere of an even ball holds points of all parts but for ties: all is seam.
+    assert_parts_change_nothing(&on_the_unit_sphere(800, 22), "a ball");
+    assert_parts_change_nothing(&cospherical_integers(), "exactly cospherical");
+    let hull: Vec<_> =
+        cubic(8).into_iter().filter(|p| p.iter().any(|&x| x == 0.0 || x == 8.0)).collect();
+    assert_parts_change_nothing(&hull, "a cube's surface");
+    let inside = scatter::<3>(300, 23).into_iter().map(|p| p.map(|x| 1.0 + 6.0 * x));
+    assert_parts_change_nothing(&hull.into_iter().chain(inside).collect::<Vec<_>>(), "a shell");
+}
+
+#[test]
+fn parts_on_one_plane_are_connected_whole() {
+    // A plane divides these into flat parts, and then into nothing.
+    let square: Vec<Point<3>> = scatter::<2>(60, 24).iter().map(|p| [0.0, p[0], p[1]]).collect();
+    let mut two = square.clone();
+    two.extend(square.iter().map(|p| [2.0, p[2], p[1]]));
+    assert_parts_change_nothing(&two, "two squares");
+    let mut pyramid = square.clone();
+    pyramid.push([5.0, 0.5, 0.5]);
+    assert_parts_change_nothing(&pyramid, "a pyramid");
+    assert_parts_change_nothing(&cubic(1), "a cube");
+    let prepared = Prepared::new(&square).unwrap();
+    assert_eq!(connect_in_parts(&prepared, 2, &mut Silent), Ok(None));
+}
+
+proptest! {
+    #[test]
+    fn small_integers_connect_alike_in_parts(
+        points in small_integers::<3>(), parts in 2_usize..6
+    ) {
+        if let Ok(prepared) = Prepared::new(&points) {
+            prop_assert_eq!(
+                connect_in_parts(&prepared, parts, &mut Silent),
+                connect_in_parts(&prepared, 1, &mut Silent)
+            );
+        }
+    }
+}
+
+#[test]
+fn cells_are_the_same_at_any_thread_count() {
+    // Enough points for a part to each of four threads.
+    let many = 5 * LEAST_PART;
+    let side = (many as f64 / 4.0).cbrt() as usize;
+    let sets = [scatter::<3>(many, 25), face_centered(side), jittered(&face_centered(side), 0.1)];
+    for points in sets {
+        let connected = |threads| {
+            let pool = rayon::ThreadPoolBuilder::new().num_threads(threads).build().unwrap();
+            pool.install(|| Delaunay::<3>::new().connect(&points, &mut Silent)).unwrap()
+        };
+        let expected = connected(1);
+        expected.validate().unwrap();
+        expected.check_delaunay().unwrap();
+        for threads in [2, 3, 4] {
+            assert_eq!(connected(threads), expected, "{threads} threads");
+        }
+    }
+}
+
+#[test]
+fn a_watch_ends_parts_at_any_step() {
+    let prepared = Prepared::new(&scatter::<3>(12_000, 26)).unwrap();
+    // One step while the parts grow, one as they are joined.
+    for steps in 1..=2 {
+        let found = connect_in_parts(&prepared, 3, &mut Stop(steps));
+        assert_eq!(found, Err(Cancelled), "{steps}");
+    }
+    assert!(connect_in_parts(&prepared, 3, &mut Stop(3)).is_ok());
+}
