@@ -39,7 +39,7 @@ pub fn hilbert_order<const D: usize>(points: &[Point<D>]) -> Vec<u32> {
             .then_with(|| lexicographic(&points[a.1 as usize], &points[b.1 as usize]))
             .then(a.1.cmp(&b.1))
     });
-    keyed.into_iter().map(|(_, index)| index).collect()
+    keyed.par_iter().map(|&(_, index)| index).collect()
 }
 
 /// Compares by x, then y (then z); 0 and −0 are equal.

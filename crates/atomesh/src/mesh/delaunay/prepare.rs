@@ -2,6 +2,7 @@
 
 use super::{ConnectError, MOST_POINTS};
 use crate::geometry::{Point, hilbert_order, lexicographic};
+use rayon::prelude::*;
 use std::cmp::Ordering;
 
 /// Products of five coordinates of this magnitude, and their rounding errors, do not underflow.
@@ -27,8 +28,9 @@ impl<const D: usize> Prepared<D> {
         }
         let scaled = scale(points)?;
         let order = hilbert_order(&scaled);
-        let points: Vec<Point<D>> = order.iter().map(|&i| scaled[i as usize]).collect();
-        if let Some(at) = points.windows(2).position(|pair| equal(&pair[0], &pair[1])) {
+        let points: Vec<Point<D>> = order.par_iter().map(|&i| scaled[i as usize]).collect();
+        let twins = points.par_windows(2).position_first(|pair| equal(&pair[0], &pair[1]));
+        if let Some(at) = twins {
             let pair = [order[at] as usize, order[at + 1] as usize];
             return Err(ConnectError::Duplicate { first: pair[0], second: pair[1] });
         }
@@ -38,25 +40,23 @@ impl<const D: usize> Prepared<D> {
 
 /// Divides by the power of two next above the largest magnitude, which is exact.
 fn scale<const D: usize>(points: &[Point<D>]) -> Result<Vec<Point<D>>, ConnectError> {
-    let mut most = 0.0_f64;
-    for (point, p) in points.iter().enumerate() {
-        if let Some(axis) = p.iter().position(|x| !x.is_finite()) {
-            return Err(ConnectError::Coordinate { point, axis, value: p[axis] });
-        }
-        most = p.iter().fold(most, |most, x| most.max(x.abs()));
+    if let Some(point) = points.par_iter().position_first(|p| !p.iter().all(|x| x.is_finite())) {
+        let axis = points[point].iter().position(|x| !x.is_finite()).unwrap_or(0);
+        return Err(ConnectError::Coordinate { point, axis, value: points[point][axis] });
     }
-    let (up, down) = power_of_two_near(most);
-    let mut scaled = Vec::with_capacity(points.len());
-    for (point, p) in points.iter().enumerate() {
-        let q = p.map(|x| x * up * down);
-        let tiny = |axis: usize| p[axis] != 0.0 && q[axis].abs() < LEAST_MAGNITUDE;
-        if let Some(axis) = (0..D).find(|&axis| tiny(axis)) {
+    let largest = |p: &Point<D>| p.iter().fold(0.0_f64, |most, x| most.max(x.abs()));
+    let (up, down) = power_of_two_near(points.par_iter().map(largest).reduce(|| 0.0, f64::max));
+    let scaled: Vec<Point<D>> = points.par_iter().map(|p| p.map(|x| x * up * down)).collect();
+    let is_tiny = |(x, scaled): (&f64, &f64)| *x != 0.0 && scaled.abs() < LEAST_MAGNITUDE;
+    let tiny = |(p, q): (&Point<D>, &Point<D>)| p.iter().zip(q).position(is_tiny);
+    let found = points.par_iter().zip(&scaled).map(tiny).enumerate().find_first(|at| at.1.is_some());
+    match found {
+        Some((point, Some(axis))) => {
             let least = LEAST_MAGNITUDE / up / down;
-            return Err(ConnectError::TooSmall { point, axis, value: p[axis], least });
+            Err(ConnectError::TooSmall { point, axis, value: points[point][axis], least })
         }
-        scaled.push(q);
+        _ => Ok(scaled),
     }
-    Ok(scaled)
 }
 
 /// Two powers of two whose product brings `most` to between 1/2 and 2; one alone could overflow.
