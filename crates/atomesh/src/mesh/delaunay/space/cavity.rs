@@ -1,15 +1,77 @@
 //! The cells in conflict with a point.
 
 use super::Triangulation;
-use super::storage::{Mark, Tetrahedron};
+use super::predicates::rounded_in_sphere;
+use super::storage::{Mark, Tetrahedra, Tetrahedron};
 use crate::geometry::Point;
+use std::ops::Range;
 
 impl Triangulation {
     /// Finds all cells in conflict with `p`, from the one that holds it, and the facets around them.
-    #[inline]
+    ///
+    /// Works from the cells of one step to all their neighbours at once. Whether a cell is in conflict
+    /// is anyone's guess: without a branch on it the processor works on many at a time.
     pub(super) fn dig(&mut self, p: &Point<3>, holder: u32) {
         debug_assert!(self.conflicts(&self.tetrahedra.cells[holder as usize], p));
-        self.spread([holder], |triangulation, cell| triangulation.conflicts(cell, p));
+        self.cavity.clear();
+        self.cavity.push(holder);
+        self.tetrahedra.marks[holder as usize] = Mark::Conflict;
+        let mut start = 0;
+        while start < self.cavity.len() {
+            let end = self.cavity.len();
+            self.ask_neighbours(start..end, p);
+            start = end;
+        }
+        self.surround();
+    }
+
+    /// Adds to the cavity the neighbours of some of its cells that are in conflict with `p`.
+    #[inline]
+    fn ask_neighbours(&mut self, steps: Range<usize>, p: &Point<3>) {
+        let Tetrahedra { cells, marks, .. } = &mut self.tetrahedra;
+        self.asked.resize(self.asked.len().max(4 * steps.len()), (0, 0.0));
+        let mut count = 0;
+        for &cell in &self.cavity[steps] {
+            for facet in cells[cell as usize].neighbours {
+                let mark = &mut marks[(facet >> 2) as usize];
+                self.asked[count].0 = facet >> 2;
+                count += usize::from(*mark == Mark::Unseen);
+                *mark = if *mark == Mark::Unseen { Mark::Asked } else { *mark };
+            }
+        }
+        for (cell, rounded) in &mut self.asked[..count] {
+            let corners = cells[*cell as usize].corners;
+            *rounded = rounded_in_sphere(corners.map(|v| &self.vertices[v as usize].at), p);
+        }
+        let mut end = self.cavity.len();
+        self.cavity.resize(end + count, 0);
+        for at in 0..count {
+            let (cell, rounded) = self.asked[at];
+            let here = &self.tetrahedra.cells[cell as usize];
+            let conflict = match self.predicates.in_sphere_if_clear(rounded) {
+                Some(inside) if !here.is_infinite() => inside,
+                _ => self.conflicts(here, p),
+            };
+            self.tetrahedra.marks[cell as usize] =
+                if conflict { Mark::Conflict } else { Mark::Kept };
+            self.cavity[end] = cell;
+            end += usize::from(conflict);
+        }
+        self.cavity.truncate(end);
+    }
+
+    /// Finds the facets around the cavity.
+    #[inline]
+    fn surround(&mut self) {
+        self.boundary.resize(4 * self.cavity.len(), 0);
+        let mut count = 0;
+        for &cell in &self.cavity {
+            for facet in self.tetrahedra.cells[cell as usize].neighbours {
+                self.boundary[count] = facet;
+                count += usize::from(self.tetrahedra.marks[(facet >> 2) as usize] == Mark::Kept);
+            }
+        }
+        self.boundary.truncate(count);
     }
 
     /// Finds all cells in conflict, from some of them, and the facets around them: `cavity` and

@@ -117,6 +117,8 @@ struct Triangulation {
     hint: u32,
     /// Cells in conflict with the point being inserted.
     cavity: Vec<u32>,
+    /// Cells that may be, and their rounded in-sphere determinants.
+    asked: Vec<(u32, f64)>,
     /// The facets around them, as seen from the cells that stay.
     boundary: Vec<u32>,
     rim: Rim,
@@ -132,6 +134,7 @@ impl Triangulation {
             predicates,
             hint: 0,
             cavity: Vec::new(),
+            asked: Vec::new(),
             boundary: Vec::new(),
             rim: Rim::default(),
         }

@@ -42,6 +42,12 @@ impl Predicates {
         exact_orientation([a, b, c, d])
     }
 
+    /// What the rounded in-sphere determinant of a positive cell tells, if it tells.
+    #[inline]
+    pub fn in_sphere_if_clear(&self, rounded: f64) -> Option<bool> {
+        (rounded.abs() > self.in_sphere_bound).then_some(rounded > 0.0)
+    }
+
     /// Whether `p`, no corner of the cell, is inside the circumsphere of a positive cell.
     #[inline]
     pub fn in_sphere(&self, cell: [&Point<3>; 4], p: &Point<3>) -> bool {
@@ -64,7 +70,7 @@ fn rounded_orientation([a, b, c, d]: [&Point<3>; 4]) -> f64 {
 }
 
 #[inline(always)]
-fn rounded_in_sphere(cell: [&Point<3>; 4], p: &Point<3>) -> f64 {
+pub(super) fn rounded_in_sphere(cell: [&Point<3>; 4], p: &Point<3>) -> f64 {
     let [a, b, c, d] = cell.map(|corner| minus(corner, p));
     let minor = |u: &Point<3>, v: &Point<3>| u[0] * v[1] - v[0] * u[1];
     let (ab, bc, cd) = (minor(&a, &b), minor(&b, &c), minor(&c, &d));

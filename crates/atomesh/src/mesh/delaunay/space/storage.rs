@@ -17,6 +17,8 @@ pub(super) const FACETS: [[usize; 3]; 4] = [[1, 3, 2], [0, 2, 3], [0, 3, 1], [0,
 pub(super) enum Mark {
     /// Not looked at.
     Unseen,
+    /// To be looked at.
+    Asked,
     /// In conflict with the point.
     Conflict,
     /// Looked at and not in conflict.
