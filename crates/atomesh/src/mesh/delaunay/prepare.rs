@@ -49,7 +49,8 @@ fn scale<const D: usize>(points: &[Point<D>]) -> Result<Vec<Point<D>>, ConnectEr
     let scaled: Vec<Point<D>> = points.par_iter().map(|p| p.map(|x| x * up * down)).collect();
     let is_tiny = |(x, scaled): (&f64, &f64)| *x != 0.0 && scaled.abs() < LEAST_MAGNITUDE;
     let tiny = |(p, q): (&Point<D>, &Point<D>)| p.iter().zip(q).position(is_tiny);
-    let found = points.par_iter().zip(&scaled).map(tiny).enumerate().find_first(|at| at.1.is_some());
+    let found =
+        points.par_iter().zip(&scaled).map(tiny).enumerate().find_first(|at| at.1.is_some());
     match found {
         Some((point, Some(axis))) => {
             let least = LEAST_MAGNITUDE / up / down;

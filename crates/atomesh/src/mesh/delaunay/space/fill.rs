@@ -89,16 +89,15 @@ impl Triangulation {
         } else {
             [a, b, c]
         };
-        let (corners, at, apex) = if c == INFINITE {
-            ([b, a, vertex, c], [1, 0, 3], 2)
+        // Written as a whole: a list changed at one place could not be read at once.
+        let (cell, at, apex) = if c == INFINITE {
+            (Tetrahedron { corners: [b, a, vertex, c], neighbours: [0, 0, facet, 0] }, [1, 0, 3], 2)
         } else {
-            ([a, b, c, vertex], [0, 1, 2], 3)
+            (Tetrahedron { corners: [a, b, c, vertex], neighbours: [0, 0, 0, facet] }, [0, 1, 2], 3)
         };
         outside.neighbours[side] = place * 4 + apex;
         self.tetrahedra.marks[kept] = Mark::Unseen;
-        let mut neighbours = [0; 4];
-        neighbours[apex as usize] = facet;
-        self.tetrahedra.cells[place as usize] = Tetrahedron { corners, neighbours };
+        self.tetrahedra.cells[place as usize] = cell;
         self.tetrahedra.marks[place as usize] = Mark::Unseen;
         let rim = [a, b, c].map(|corner| self.rim.place(&mut self.vertices, corner));
         self.rim.new_cells.push(NewCell { place, rim, corners: at });

@@ -1,8 +1,8 @@
 //! Parts connected in parallel give the cells of one insertion of all points.
 
 use super::*;
-use crate::mesh::{Delaunay, merge_duplicates};
 use crate::mesh::delaunay::tests::*;
+use crate::mesh::{Delaunay, merge_duplicates};
 use crate::watch::Silent;
 use proptest::prelude::*;
 
