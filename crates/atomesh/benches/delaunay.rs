@@ -4,6 +4,7 @@ use atomesh::geometry::Point;
 use atomesh::mesh::Delaunay;
 use atomesh::watch::Silent;
 use criterion::{BenchmarkId, Criterion, criterion_group, criterion_main};
+use rayon::ThreadPoolBuilder;
 
 /// SplitMix64 (Steele, Lea & Flood 2014), uniform in [0, 1): a few lines in any language.
 struct Random(u64);
@@ -46,19 +47,23 @@ fn connect<const D: usize>(
 ) {
     let mut group = criterion.benchmark_group("connect");
     group.sample_size(10);
-    group.bench_with_input(BenchmarkId::new(name, points.len()), points, |bencher, points| {
-        bencher.iter(|| delaunay.connect(points, &mut Silent));
-    });
+    for threads in [1, 2] {
+        let pool = ThreadPoolBuilder::new().num_threads(threads).build().expect("threads start");
+        let id = BenchmarkId::new(format!("{name}, {threads} threads"), points.len());
+        group.bench_with_input(id, points, |bencher, points| {
+            bencher.iter(|| pool.install(|| delaunay.connect(points, &mut Silent)));
+        });
+    }
     group.finish();
 }
 
 fn benches(criterion: &mut Criterion) {
-    for count in [100_000, 1_000_000] {
+    for count in [50_000, 1_000_000] {
         connect(criterion, "scattered", Delaunay::<3>::new(), &scattered(count));
         connect(criterion, "jittered", Delaunay::<3>::new(), &crystal(count, 0.1, 1.0));
+        connect(criterion, "perfect", Delaunay::<3>::new(), &crystal(count, 0.0, 1.0));
     }
-    connect(criterion, "perfect", Delaunay::<3>::new(), &crystal(100_000, 0.0, 1.0));
-    connect(criterion, "rounded", Delaunay::<3>::new(), &crystal(100_000, 0.0, 0.1));
+    connect(criterion, "rounded", Delaunay::<3>::new(), &crystal(50_000, 0.0, 0.1));
     connect(criterion, "plane", Delaunay::<2>::new(), &scattered(100_000));
 }
 

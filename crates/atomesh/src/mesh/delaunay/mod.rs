@@ -23,6 +23,7 @@ use crate::watch::{Cancelled, Phase, Watch, check};
 
 use prepare::Prepared;
 pub use prepare::merge_duplicates;
+use rayon::prelude::*;
 
 /// Why points were not connected.
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]
@@ -162,6 +163,6 @@ impl<const D: usize> Delaunay<D> {
         let corners = (self.connector)(&prepared, watch)?
             .ok_or(ConnectError::Flat { count: points.len(), dimension: D })?;
         check(watch, Phase::Connect, 1.0, None)?;
-        Ok(Mesh::new(points.to_vec(), corners)?)
+        Ok(Mesh::new(points.par_iter().copied().collect(), corners)?)
     }
 }

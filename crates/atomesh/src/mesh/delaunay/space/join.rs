@@ -50,6 +50,7 @@ pub(super) fn join(
     });
     let mut triangulations = parts.into_iter().map(|part| part.triangulation).collect::<Vec<_>>();
     let (first, others) = triangulations.split_first_mut().expect("there is a part");
+    let base = first.vertices.len() as u32;
     let mut border = Vec::new();
     let mut added = Vec::new();
     for other in others {
@@ -60,7 +61,7 @@ pub(super) fn join(
         check(watch, Phase::Connect, share + (1.0 - share) * done, None)?;
         vertices.iter().for_each(|&vertex| first.insert(vertex));
     }
-    first.cut(border);
+    first.cut(border, base);
     Ok(triangulations)
 }
 
@@ -97,29 +98,28 @@ impl Triangulation {
         rounds::order(seam.len()).into_iter().map(|place| base + place).collect()
     }
 
-    /// Removes the cells beyond the border, on the side of its final cells.
-    fn cut(&mut self, mut border: Vec<Border>) {
+    /// Removes the cells beyond the border, on the side of its final cells. Vertices from `base` on
+    /// are the seam's.
+    fn cut(&mut self, mut border: Vec<Border>, base: u32) {
         border.sort_unstable_by_key(|facet| facet.vertices);
-        let mut is_border = vec![false; self.vertices.len()];
-        border.iter().flat_map(|facet| facet.vertices).for_each(|v| is_border[v as usize] = true);
         let beyond: Vec<u32> = (0..self.tetrahedra.cells.len())
             .into_par_iter()
-            .flat_map_iter(|cell| self.facets_beyond(cell, &border, &is_border))
+            .flat_map_iter(|cell| self.facets_beyond(cell, &border, base))
             .collect();
         assert_eq!(beyond.len(), border.len(), "every facet of the border is a facet of the seam");
-        let mut stack = Vec::new();
-        for facet in &beyond {
-            self.tetrahedra.cells[(facet >> 2) as usize].neighbours[(facet & 3) as usize] =
-                u32::MAX;
-            stack.push(facet >> 2);
+        const NONE: u32 = u32::MAX;
+        let mut cells = Vec::new();
+        for facet in beyond {
+            let (cell, corner) = (facet >> 2, facet & 3);
+            self.tetrahedra.cells[cell as usize].neighbours[corner as usize] = NONE;
+            cells.push(cell);
         }
-        while let Some(cell) = stack.pop() {
-            if self.tetrahedra.marks[cell as usize] == Mark::Free {
-                continue;
+        while let Some(cell) = cells.pop() {
+            if self.tetrahedra.marks[cell as usize] != Mark::Free {
+                self.tetrahedra.release(cell);
+                let facets = self.tetrahedra.cells[cell as usize].neighbours;
+                cells.extend(facets.iter().filter(|&&facet| facet != NONE).map(|facet| facet >> 2));
             }
-            self.tetrahedra.release(cell);
-            let inner = self.tetrahedra.cells[cell as usize].neighbours;
-            stack.extend(inner.into_iter().filter(|&f| f != u32::MAX).map(|facet| facet >> 2));
         }
     }
 
@@ -128,21 +128,20 @@ impl Triangulation {
         &self,
         cell: usize,
         border: &[Border],
-        is_border: &[bool],
+        base: u32,
     ) -> impl Iterator<Item = u32> {
         let corners = self.tetrahedra.cells[cell].corners;
-        let count = corners.iter().filter(|&&corner| is_border[corner as usize]).count();
-        let live = count >= 3 && self.tetrahedra.marks[cell] != Mark::Free;
-        (0..4)
-            .filter(move |&k| {
-                let facet = FACETS[k].map(|corner| corners[corner]);
-                live && facet.iter().all(|&v| is_border[v as usize]) && {
-                    let (vertices, odd) = sorted(facet);
-                    let found = border.binary_search_by_key(&vertices, |facet| facet.vertices);
-                    found.is_ok_and(|at| border[at].odd == odd)
-                }
-            })
-            .map(move |k| 4 * cell as u32 + k as u32)
+        let may_be = move |vertex: u32| vertex >= base || vertex == INFINITE;
+        let count = corners.iter().filter(|&&vertex| may_be(vertex)).count();
+        let is_near = count >= 3 && self.tetrahedra.marks[cell] != Mark::Free;
+        let is_beyond = move |corner: &usize| {
+            let facet = FACETS[*corner].map(|k| corners[k]);
+            let (vertices, odd) = sorted(facet);
+            let found = || border.binary_search_by_key(&vertices, |facet| facet.vertices);
+            facet.into_iter().all(may_be) && found().is_ok_and(|at| border[at].odd == odd)
+        };
+        let corners = if is_near { 0..4 } else { 0..0 };
+        corners.filter(is_beyond).map(move |corner| (4 * cell + corner) as u32)
     }
 }
 
