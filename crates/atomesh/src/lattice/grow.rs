@@ -15,7 +15,7 @@ use crate::watch::{Cancelled, Phase, Watch, check};
 
 use super::Lattice;
 use super::crystal::Crystal;
-use super::occupancy::Occupancy;
+use super::occupancy::{Look, Occupancy};
 
 /// How a lattice is grown.
 #[derive(Clone, Debug, PartialEq)]
@@ -113,14 +113,16 @@ pub fn grow<const D: usize>(
     if expected > MOST_POINTS as f64 {
         return Err(LatticeError::TooMany { limit: MOST_POINTS });
     }
-    let (least, greatest) = (gamma * distance.least(), gamma * distance.greatest());
-    let mut occupancy = Occupancy::new(bounds, least, greatest, expected as usize);
-    for p in lattice.atoms() {
-        occupancy.take(*p, gamma * distance.at(p));
+    let mut occupancy = balls(bounds, distance, gamma, expected as usize);
+    let nominal: Vec<f64> = lattice.atoms().iter().map(|p| distance.at(p)).collect();
+    for (p, d) in lattice.atoms().iter().zip(&nominal) {
+        occupancy.take(*p, gamma * d);
     }
     // the user's atoms come first, each once
     let seeds = lattice.atoms().iter().take_while(|p| options.seed_points.contains(p)).count();
-    let mut growth = Growth { lattice, occupancy, distance, gamma, quantum, seeds, expected };
+    let unsure = slope_of_a_step(distance);
+    let mut growth =
+        Growth { lattice, nominal, occupancy, distance, gamma, unsure, quantum, seeds, expected };
     for face in 0..if D == 3 { 6 } else { 0 } {
         growth.face(face / 2, face % 2 == 1, watch)?;
     }
@@ -133,7 +135,7 @@ pub(super) struct Boundary<'a, const D: usize> {
     lattice: Lattice<D>,
     distance: &'a NominalDistance<D>,
     /// Coordinates are multiples of this power of two.
-    quantum: f64,
+    pub(super) quantum: f64,
 }
 
 impl<'a, const D: usize> Boundary<'a, D> {
@@ -208,9 +210,13 @@ impl<'a, const D: usize> Boundary<'a, D> {
 
 struct Growth<'a, const D: usize> {
     lattice: Lattice<D>,
+    /// d at the atoms.
+    nominal: Vec<f64>,
     occupancy: Occupancy<D>,
     distance: &'a NominalDistance<D>,
     gamma: f64,
+    /// See [`slope_of_a_step`].
+    unsure: f64,
     quantum: f64,
     /// How many of the first atoms are the user's.
     seeds: usize,
@@ -221,18 +227,50 @@ struct Growth<'a, const D: usize> {
 /// a crystal are smaller, so that where growth has passed little is added.
 const RESTART: f64 = 0.85;
 
+/// The diameter, in d, of the ball that must be free for an atom to be added from the boundary.
+pub(super) fn restart_room(gamma: f64) -> f64 {
+    (2.0 * RESTART - gamma).max(gamma)
+}
+
+/// The most by which d at an ideal site differs from d at its atom, over that.
+fn slope_of_a_step<const D: usize>(distance: &NominalDistance<D>) -> f64 {
+    1.001 * distance.greatest_slope() // a step is d long, but for its snapping
+}
+
+/// Room for about `expected` balls of diameter γ d in `bounds`.
+fn balls<const D: usize>(
+    bounds: Bounds<D>,
+    distance: &NominalDistance<D>,
+    gamma: f64,
+    expected: usize,
+) -> Occupancy<D> {
+    let slope = gamma * distance.greatest_slope();
+    Occupancy::new(bounds, gamma * distance.least(), gamma * distance.greatest(), expected).smooth(
+        slope,
+        restart_room(gamma) / gamma,
+        slope_of_a_step(distance),
+    )
+}
+
 impl<const D: usize> Growth<'_, D> {
     fn snap(&self, p: Point<D>) -> Point<D> {
-        p.map(|x| (x / self.quantum).round() * self.quantum)
+        let inverse = 1.0 / self.quantum; // exact, of a power of two
+        p.map(|x| round(x * inverse) * self.quantum)
     }
 
-    fn add(&mut self, p: Point<D>, freedom: u8, temperature: f32) {
-        self.occupancy.take(p, self.gamma * self.distance.at(&p));
-        self.lattice.push(p, freedom, temperature);
+    /// Adds an atom at `p`, where the nominal distance is `d`.
+    fn add(&mut self, p: Point<D>, d: f64, freedom: u8) {
+        self.occupancy.take(p, self.gamma * d);
+        self.nominal.push(d);
+        self.lattice.push(p, freedom, 1.0);
     }
 
-    fn is_free(&self, p: &Point<D>) -> bool {
-        self.occupancy.is_free(p, self.gamma * self.distance.at(p))
+    /// Adds an atom at `p` if a ball of diameter γ d is free there.
+    fn try_to_add(&mut self, p: Point<D>, freedom: u8) {
+        let d = self.distance.at(&p);
+        if self.occupancy.is_free(&p, self.gamma * d) {
+            self.add(p, d, freedom);
+        }
     }
 
     /// One face of the box in 3-D, where `normal` is at its least or greatest.
@@ -263,21 +301,17 @@ impl<const D: usize> Growth<'_, D> {
             .collect();
         let mut flat = Bounds { min, max };
         (flat.min[normal], flat.max[normal]) = (centre[normal], centre[normal]);
-        let (least, greatest) = (self.distance.least(), self.distance.greatest());
-        let plane = Occupancy::new(flat, self.gamma * least, self.gamma * greatest, on_face.len());
+        let plane = balls(flat, self.distance, self.gamma, on_face.len());
         let whole = std::mem::replace(&mut self.occupancy, plane);
         for i in (0..self.seeds).chain(on_face.iter().copied()) {
-            let p = self.lattice.atoms[i];
-            self.occupancy.take(p, self.gamma * self.distance.at(&p));
+            self.occupancy.take(self.lattice.atoms[i], self.gamma * self.nominal[i]);
         }
         let first = self.lattice.len();
-        if self.is_free(&centre) {
-            self.add(centre, freedom, 1.0);
-        }
+        self.try_to_add(centre, freedom);
         self.fill(first, &on_face, &steps, freedom, watch)?;
         self.occupancy = whole;
-        for p in &self.lattice.atoms[first..] {
-            self.occupancy.take(*p, self.gamma * self.distance.at(p));
+        for i in first..self.lattice.len() {
+            self.occupancy.take(self.lattice.atoms[i], self.gamma * self.nominal[i]);
         }
         Ok(())
     }
@@ -296,9 +330,7 @@ impl<const D: usize> Growth<'_, D> {
         }
         if self.lattice.len() == first {
             let centre = self.snap(std::array::from_fn(|k| 0.5 * (min[k] + max[k])));
-            if self.is_free(&centre) {
-                self.add(centre, freedom, 1.0);
-            }
+            self.try_to_add(centre, freedom);
         }
         let boundary: Vec<usize> = (0..first).collect();
         self.fill(first, &boundary, crystal.neighbors(), freedom, watch)
@@ -316,7 +348,7 @@ impl<const D: usize> Growth<'_, D> {
         self.spread(first, steps, freedom, watch)?;
         for &i in rim {
             let next = self.lattice.len();
-            self.surround(i, steps, freedom, (2.0 * RESTART - self.gamma).max(self.gamma));
+            self.surround(i, steps, freedom, restart_room(self.gamma));
             self.spread(next, steps, freedom, watch)?;
         }
         Ok(())
@@ -346,19 +378,41 @@ impl<const D: usize> Growth<'_, D> {
     /// Puts atoms on the ideal sites around atom `i` where a ball of diameter `room` d is free.
     fn surround(&mut self, i: usize, steps: &[Point<D>], freedom: u8, room: f64) {
         let Bounds { min, max } = self.lattice.bounds;
-        let from = self.lattice.atoms[i];
-        let d = self.distance.at(&from);
+        let (from, d) = (self.lattice.atoms[i], self.nominal[i]);
+        let (least, greatest) = (d * (1.0 - self.unsure).max(0.0), d * (1.0 + self.unsure));
         for step in steps {
             let step = self.snap(step.map(|s| s * d));
             let site: Point<D> = std::array::from_fn(|k| from[k] + step[k]);
             let inside = (0..D).all(|k| {
                 if freedom >> k & 1 == 1 { min[k] < site[k] && site[k] < max[k] } else { true }
             });
-            if inside && self.occupancy.is_free(&site, room * self.distance.at(&site)) {
-                self.add(site, freedom, 1.0);
+            if !inside {
+                continue;
+            }
+            let own = self.gamma * d;
+            // d is read at the site only where its atom's does not settle the matter
+            let look = self.occupancy.look(&site, &(room * least..=room * greatest), own);
+            if look == Look::Taken {
+                continue;
+            }
+            let d = self.distance.at(&site);
+            let test = room * d;
+            if look == Look::Free || self.occupancy.look(&site, &(test..=test), own) == Look::Free {
+                self.add(site, d, freedom);
             }
         }
     }
+}
+
+/// [`f64::round`], which calls a library on machines that need not have an instruction for it.
+#[inline(always)]
+fn round(x: f64) -> f64 {
+    const WHOLE: f64 = (1_u64 << 52) as f64;
+    let size = x.abs();
+    // adding 2^52 leaves no fraction; a half may go down to an even number then
+    let even = (size + WHOLE) - WHOLE;
+    let rounded = if size - even == 0.5 { even + 1.0 } else { even };
+    if size < WHOLE { rounded.copysign(x) } else { x }
 }
 
 /// Where a line from `start` along `axis` to `end` is divided evenly in ∫dx/d, ends left out.
@@ -379,8 +433,11 @@ fn even_steps<const D: usize>(
     };
     let mut total = Vec::with_capacity(count + 1);
     total.push(0.0);
+    let mut before = rate(0);
     for i in 0..count {
-        total.push(total[i] + 0.5 * h * (rate(i) + rate(i + 1)));
+        let after = rate(i + 1);
+        total.push(total[i] + 0.5 * h * (before + after));
+        before = after;
     }
     let all = total[count];
     let pieces = all.round().max(1.0) as usize;

@@ -10,6 +10,8 @@ mod occupancy;
 mod scatter;
 #[cfg(test)]
 mod tests;
+#[cfg(test)]
+mod twin;
 
 pub use crystal::{Crystal, CrystalKind};
 pub use grow::{GrowOptions, LatticeError, grow};

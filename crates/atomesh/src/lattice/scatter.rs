@@ -213,8 +213,9 @@ impl<const D: usize> Spread<'_, D> {
         let greatest = holes.iter().map(radius).fold(0.0, f64::max);
         let mut taken = Occupancy::new(*bounds, least, greatest, holes.len());
         for hole in holes {
-            if taken.is_free(&hole.centre, radius(hole)) {
-                taken.take(hole.centre, radius(hole));
+            let diameter = radius(hole);
+            if taken.is_free(&hole.centre, diameter) {
+                taken.take(hole.centre, diameter);
                 atoms.push(hole.centre);
             }
         }
