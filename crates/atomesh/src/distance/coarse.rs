@@ -34,7 +34,10 @@ pub(super) fn reduce<const D: usize>(
 ) -> Vec<f32> {
     let mut shape = from.shape;
     let mut reduced: Option<Vec<f32>> = None;
-    for axis in 0..D {
+    for turn in 0..D {
+        // the least is the same in any order: the axis whose lines lie farthest apart goes first, so that
+        // the samples are read as they lie and what is left for the others is small
+        let axis = if take == Take::Least { D - 1 - turn } else { turn };
         if to.shape[axis] < shape[axis] {
             let source = reduced.as_deref().unwrap_or(values);
             let footprints = footprints(shape[axis], to.shape[axis]);
@@ -79,26 +82,49 @@ fn reduce_axis(
     footprints: &[Footprint],
     take: Take,
 ) -> Vec<f32> {
-    let outer = values.len() / (n * inner);
-    let mut out = vec![0.0; outer * footprints.len() * inner];
-    let blocks = values.par_chunks(n * inner);
-    out.par_chunks_mut(footprints.len() * inner).zip(blocks).for_each(|(out, block)| {
-        for (out, footprint) in out.chunks_exact_mut(inner).zip(footprints) {
-            let lines = block.chunks_exact(inner).skip(footprint.first).zip(&footprint.weights);
-            match take {
-                Take::Magnitude => lines.for_each(|(line, &w)| {
-                    out.iter_mut().zip(line).for_each(|(o, v)| *o += w * v.abs());
-                }),
-                Take::Least => {
-                    out.fill(f32::INFINITY);
-                    lines.for_each(|(line, _)| {
-                        out.iter_mut().zip(line).for_each(|(o, v)| *o = o.min(*v));
-                    });
-                }
+    let nodes = footprints.len();
+    let mut out = vec![0.0; values.len() / n * nodes];
+    if inner == 1 {
+        let rows = values.par_chunks_exact(n);
+        out.par_chunks_exact_mut(nodes).zip(rows).for_each(|(out, row)| {
+            for (out, footprint) in out.iter_mut().zip(footprints) {
+                *out = footprint.of(row, take);
+            }
+        });
+        return out;
+    }
+    out.par_chunks_exact_mut(inner).enumerate().for_each(|(line, out)| {
+        let block = &values[line / nodes * n * inner..][..n * inner];
+        let footprint = &footprints[line % nodes];
+        let lines = block.chunks_exact(inner).skip(footprint.first).zip(&footprint.weights);
+        match take {
+            Take::Magnitude => lines.for_each(|(line, &w)| {
+                out.iter_mut().zip(line).for_each(|(o, v)| *o += w * v.abs());
+            }),
+            Take::Least => {
+                out.fill(f32::INFINITY);
+                lines.for_each(|(line, _)| {
+                    out.iter_mut().zip(line).for_each(|(o, &v)| *o = if v < *o { v } else { *o });
+                });
             }
         }
     });
     out
+}
+
+impl Footprint {
+    /// What the node takes from a row of samples.
+    fn of(&self, row: &[f32], take: Take) -> f32 {
+        let samples = &row[self.first..self.first + self.weights.len()];
+        match take {
+            Take::Magnitude => {
+                samples.iter().zip(&self.weights).fold(0.0, |sum, (v, w)| sum + w * v.abs())
+            }
+            Take::Least => {
+                samples.iter().fold(f32::INFINITY, |least, &v| if v < least { v } else { least })
+            }
+        }
+    }
 }
 
 #[cfg(test)]

@@ -203,10 +203,11 @@ impl<const D: usize> NominalDistance<D> {
     ) -> Result<Self, DistanceError> {
         check_count(grid, field.len())?;
         check_limit(gradient_limit)?;
-        if let Some(index) = field.iter().position(|d| !(d.is_finite() && *d > 0.0)) {
+        let Some(least) = least_length(field) else {
+            let index = field.iter().position(|d| !is_length(*d)).unwrap_or(0);
             return Err(DistanceError::FieldValue { index, value: field[index] });
-        }
-        let least = field.iter().copied().fold(f32::INFINITY, f32::min).into();
+        };
+        let least = least.into();
         check_step(grid, least)?;
         let nodes = coarse_grid(grid, 0.5 * least);
         let mut values = reduce(field, grid, &nodes, Take::Least);
@@ -366,6 +367,35 @@ fn greatest_slope<const D: usize>(values: &[f32], nodes: &Grid<D>) -> f64 {
     let rows: usize = cells[1..].iter().product();
     (0..rows).into_par_iter().map(squared_of_row).reduce(|| 0.0, f64::max).sqrt()
 }
+
+fn is_length(value: f32) -> bool {
+    value > 0.0 && value <= f32::MAX
+}
+
+/// The least value; `None` if one is no length above 0.
+fn least_length(field: &[f32]) -> Option<f32> {
+    let of_block = |block: &[f32]| {
+        // side by side, so that none waits for another
+        let (mut least, mut bad) = ([f32::INFINITY; LANES], [false; LANES]);
+        let (blocks, tail) = block.as_chunks::<LANES>();
+        let mut look = |values: &[f32]| {
+            for ((least, bad), &d) in least.iter_mut().zip(&mut bad).zip(values) {
+                *least = if d < *least { d } else { *least };
+                *bad |= !is_length(d);
+            }
+        };
+        blocks.iter().for_each(|values| look(values));
+        look(tail);
+        (least.into_iter().fold(f32::INFINITY, f32::min), !bad.contains(&true))
+    };
+    let both = |a: (f32, bool), b: (f32, bool)| (a.0.min(b.0), a.1 & b.1);
+    let (least, good) =
+        field.par_chunks(BLOCK).map(of_block).reduce(|| (f32::INFINITY, true), both);
+    good.then_some(least)
+}
+
+/// Values that one thread looks at in a go.
+const BLOCK: usize = 1 << 16;
 
 /// The weight of node `i` of `n` in the trapezoidal rule.
 fn trapezoid(i: usize, n: usize) -> f64 {
