@@ -23,7 +23,7 @@ pub fn hilbert_order<const D: usize>(points: &[Point<D>]) -> Vec<u32> {
     let side = bounds.extent().into_iter().fold(0.0, f64::max);
     let cells = (1_u64 << bits) as f64;
     let curve = HilbertCurve::<D>::new();
-    let mut keyed: Vec<(u64, u32)> = points
+    let keyed: Vec<(u64, u32)> = points
         .par_iter()
         .enumerate()
         .map(|(index, p)| {
@@ -34,12 +34,43 @@ pub fn hilbert_order<const D: usize>(points: &[Point<D>]) -> Vec<u32> {
             (curve.key(cell, bits), index as u32)
         })
         .collect();
-    keyed.par_sort_unstable_by(|a, b| {
+    let before = |a: &(u64, u32), b: &(u64, u32)| {
         a.0.cmp(&b.0)
             .then_with(|| lexicographic(&points[a.1 as usize], &points[b.1 as usize]))
             .then(a.1.cmp(&b.1))
-    });
-    keyed.par_iter().map(|&(_, index)| index).collect()
+    };
+    let (mut dealt, ends) = deal(&keyed, bits * D);
+    let mut hands = Vec::with_capacity(ends.len());
+    let (mut rest, mut start) = (&mut dealt[..], 0);
+    for end in ends {
+        let (hand, after) = rest.split_at_mut(end - start);
+        hands.push(hand);
+        (rest, start) = (after, end);
+    }
+    hands.into_par_iter().with_min_len(64).for_each(|hand| hand.sort_unstable_by(before));
+    dealt.into_par_iter().map(|(_, index)| index).collect()
+}
+
+/// The leading bits of a key by which points are dealt before they are sorted.
+const DEALT_BITS: usize = 12;
+
+/// The keyed indices by the leading bits of their keys of `bits` bits, and where each share ends.
+fn deal(keyed: &[(u64, u32)], bits: usize) -> (Vec<(u64, u32)>, Vec<usize>) {
+    let shift = bits.saturating_sub(DEALT_BITS);
+    let share = |key: u64| (key >> shift) as usize;
+    let mut ends = vec![0; 1 << bits.min(DEALT_BITS)];
+    keyed.iter().for_each(|(key, _)| ends[share(*key)] += 1);
+    let mut sum = 0;
+    for end in &mut ends {
+        (sum, *end) = (sum + *end, sum);
+    }
+    let mut dealt = vec![(0, 0); keyed.len()];
+    for entry in keyed {
+        let at = &mut ends[share(entry.0)];
+        dealt[*at] = *entry;
+        *at += 1;
+    }
+    (dealt, ends)
 }
 
 /// Compares by x, then y (then z); 0 and −0 are equal.
@@ -63,11 +94,21 @@ struct HilbertCurve<const D: usize> {
     /// For each state and half: the next state's first place in this table, times 2^D, plus the
     /// place of the half along the curve.
     steps: Vec<u16>,
+    /// The same for [`Self::LEVELS`] steps at a time.
+    strides: Vec<u16>,
+    /// Numbers below 2^[`Self::LEVELS`] with their bits D apart.
+    apart: Vec<u8>,
 }
 
 impl<const D: usize> HilbertCurve<D> {
     /// 2^D, the halves along all axes.
     const HALVES: usize = 1 << D;
+
+    /// The halvings that one stride goes down: six bits of a key.
+    const LEVELS: usize = if D < 6 { 6 / D } else { 1 };
+
+    /// A stride's places, 2^(D · levels).
+    const PLACES: usize = 1 << (D * Self::LEVELS);
 
     fn new() -> Self {
         let mut steps = Vec::with_capacity(Self::HALVES * Self::HALVES * D);
@@ -82,20 +123,49 @@ impl<const D: usize> HilbertCurve<D> {
                 }
             }
         }
-        Self { steps }
+        let apart = (0..1_usize << Self::LEVELS)
+            .map(|n| (0..Self::LEVELS).map(|b| (n >> b & 1) << (D * b)).sum::<usize>() as u8)
+            .collect();
+        let mut curve = Self { steps, strides: Vec::new(), apart };
+        for state in 0..Self::HALVES * D {
+            for place in 0..Self::PLACES {
+                let (mut key, mut state) = (0, state * Self::HALVES);
+                for level in (0..Self::LEVELS).rev() {
+                    curve.step(&mut key, &mut state, place >> (D * level) & (Self::HALVES - 1));
+                }
+                let next = state / Self::HALVES * Self::PLACES;
+                curve.strides.push((next + key as usize) as u16);
+            }
+        }
+        curve
+    }
+
+    /// Goes down to a half.
+    #[inline(always)]
+    fn step(&self, key: &mut u64, state: &mut usize, half: usize) {
+        let step = usize::from(self.steps[*state + half]);
+        *key = *key << D | (step % Self::HALVES) as u64;
+        *state = step / Self::HALVES;
     }
 
     /// The number of a cell among the `2^bits` a side.
     fn key(&self, cell: [u32; D], bits: usize) -> u64 {
         let (mut key, mut state) = (0, 0);
-        for b in (0..bits).rev() {
-            let mut half = 0;
+        let odd = bits % Self::LEVELS;
+        for b in (bits - odd..bits).rev() {
+            let half = (0..D).map(|k| (cell[k] as usize >> b & 1) << k).sum();
+            self.step(&mut key, &mut state, half);
+        }
+        state = state / Self::HALVES * Self::PLACES;
+        for b in (0..bits - odd).step_by(Self::LEVELS).rev() {
+            let mut place = 0;
             for k in 0..D {
-                half |= (cell[k] as usize >> b & 1) << k;
+                let part = cell[k] as usize >> b & ((1 << Self::LEVELS) - 1);
+                place |= usize::from(self.apart[part]) << k;
             }
-            let step = usize::from(self.steps[state + half]);
-            key = key << D | (step % Self::HALVES) as u64;
-            state = step / Self::HALVES;
+            let stride = usize::from(self.strides[state + place]);
+            key = key << (D * Self::LEVELS) | (stride % Self::PLACES) as u64;
+            state = stride - stride % Self::PLACES;
         }
         key
     }
@@ -152,6 +222,57 @@ mod tests {
     fn the_curve_visits_every_cell_once_and_only_steps_to_a_neighbour() {
         curve_is_a_walk_through_all_cells::<2>(5);
         curve_is_a_walk_through_all_cells::<3>(3);
+    }
+
+    fn strides_follow_steps<const D: usize>() {
+        let curve = HilbertCurve::<D>::new();
+        let bits = KEY_BITS / D;
+        let mut random = 1_u64;
+        for _ in 0..1000 {
+            let cell: [u32; D] = std::array::from_fn(|_| {
+                random = random.wrapping_mul(6_364_136_223_846_793_005).wrapping_add(1);
+                (random >> (64 - bits)) as u32
+            });
+            let (mut key, mut state) = (0, 0);
+            for b in (0..bits).rev() {
+                let half = (0..D).map(|k| (cell[k] as usize >> b & 1) << k).sum();
+                curve.step(&mut key, &mut state, half);
+            }
+            assert_eq!(curve.key(cell, bits), key, "{cell:?}");
+        }
+    }
+
+    #[test]
+    fn a_stride_is_some_steps() {
+        strides_follow_steps::<2>();
+        strides_follow_steps::<3>();
+    }
+
+    #[test]
+    fn points_come_in_the_order_of_a_plain_sort() {
+        let mut random = 1_u64;
+        let mut next = || {
+            random = random.wrapping_mul(6_364_136_223_846_793_005).wrapping_add(1);
+            (random >> 40) as f64
+        };
+        let points: Vec<Point<3>> = (0..5000).map(|_| [next(), next() * 0.1, 3.0]).collect();
+        let bounds = Bounds::of(&points).unwrap();
+        let side = bounds.extent().into_iter().fold(0.0, f64::max);
+        let cells = (1_u64 << (KEY_BITS / 3)) as f64;
+        let curve = HilbertCurve::<3>::new();
+        let key = |i: &u32| {
+            let p = points[*i as usize];
+            let cell = std::array::from_fn(|k| {
+                ((p[k] - bounds.min[k]) / side * cells).min(cells - 1.0) as u32
+            });
+            curve.key(cell, KEY_BITS / 3)
+        };
+        let mut plain: Vec<u32> = (0..5000).collect();
+        plain.sort_by(|a, b| {
+            let places = (points[*a as usize], points[*b as usize]);
+            key(a).cmp(&key(b)).then_with(|| lexicographic(&places.0, &places.1)).then(a.cmp(b))
+        });
+        assert_eq!(hilbert_order(&points), plain);
     }
 
     #[test]
