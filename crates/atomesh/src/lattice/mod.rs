@@ -8,6 +8,7 @@ mod crystal;
 mod grow;
 mod occupancy;
 mod scatter;
+mod settle;
 #[cfg(test)]
 mod tests;
 #[cfg(test)]
@@ -15,9 +16,10 @@ mod twin;
 
 pub use crystal::{Crystal, CrystalKind};
 pub use grow::{GrowOptions, LatticeError, grow};
-pub use scatter::{ScatterOptions, Scatterer, scatter};
+pub use scatter::{ScatterOptions, Scatterer, fill_holes, scatter};
+pub use settle::settle;
 
-use crate::geometry::{Bounds, Point};
+use crate::geometry::{Bounds, Point, hilbert_order};
 
 /// Atoms in the box of an image, in lattice coordinates.
 #[derive(Clone, Debug)]
@@ -82,6 +84,13 @@ impl<const D: usize> Lattice<D> {
         assert_eq!(atoms.len(), self.atoms.len());
         self.atoms = atoms;
         self
+    }
+
+    /// The same atoms along a Hilbert curve (see [`hilbert_order`]): what is near in memory is then near
+    /// in space, as all later work is fastest.
+    pub fn along_curve(self) -> Self {
+        let order = hilbert_order(&self.atoms);
+        self.reordered(&order)
     }
 
     /// The same atoms in another order: entry `i` of the result is atom `order[i]`.

@@ -15,7 +15,7 @@ use rayon::prelude::*;
 use crate::distance::NominalDistance;
 use crate::geometry::linear::solve;
 use crate::geometry::{Bounds, Point, difference, distance_squared, dot};
-use crate::mesh::{ConnectError, Delaunay};
+use crate::mesh::{ConnectError, Delaunay, Mesh};
 use crate::watch::{Phase, Watch, check};
 
 use super::Lattice;
@@ -55,6 +55,28 @@ impl Default for Scatterer<3> {
     }
 }
 
+impl<const D: usize> Scatterer<D> {
+    /// The Delaunay mesh of atoms.
+    pub(super) fn connect(
+        &self,
+        atoms: &[Point<D>],
+        watch: &mut dyn Watch,
+    ) -> Result<Mesh<D>, LatticeError> {
+        connect(&self.delaunay, atoms, watch)
+    }
+}
+
+fn connect<const D: usize>(
+    delaunay: &Delaunay<D>,
+    atoms: &[Point<D>],
+    watch: &mut dyn Watch,
+) -> Result<Mesh<D>, LatticeError> {
+    delaunay.connect(atoms, watch).map_err(|error| match error {
+        ConnectError::Cancelled(cancelled) => LatticeError::Cancelled(cancelled),
+        other => LatticeError::Connect(other.to_string()),
+    })
+}
+
 /// How atoms are scattered.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct ScatterOptions<const D: usize> {
@@ -82,26 +104,62 @@ pub fn scatter<const D: usize>(
     let mut lattice = Boundary::new(bounds, distance)?.plant_and_divide(&options.seed_points)?;
     if D == 3 {
         for face in 0..6 {
-            scatter_face(&mut lattice, face / 2, face % 2 == 1, distance, &mut random, watch)?;
+            let random = Some(&mut random);
+            fill_face(&mut lattice, face / 2, face % 2 == 1, distance, ROUND_LIMIT, random, watch)?;
         }
     }
-    let spread = Spread { delaunay: &scatterer.delaunay, limit: scatterer.limit };
+    let spread =
+        Spread { delaunay: &scatterer.delaunay, limit: scatterer.limit, rounds: ROUND_LIMIT };
     let all = ((1usize << D) - 1) as u8;
     let field = |p: &Point<D>| distance.at(p);
-    let inside = spread.fill(lattice.atoms(), &bounds, &field, &mut random, watch)?;
-    for p in inside {
+    let mut atoms = lattice.atoms().to_vec();
+    start(&mut atoms, &bounds, &field, &mut random);
+    spread.complete(&mut atoms, &bounds, &field, watch)?;
+    for p in atoms.split_off(lattice.len()) {
         lattice.push(p, all, 1.0);
     }
     Ok(lattice)
 }
 
-/// Scatters atoms over one face of a box in 3-D, as a plane of its own.
-fn scatter_face<const D: usize>(
+/// Adds atoms where a lattice leaves holes: circumcentres of simplices with the largest r/d first, until
+/// none is above the limit or `rounds` meshes have been looked at.
+///
+/// A grown lattice has such holes where d varies, since a crystal's front does not fit the next one's, and
+/// with them too few atoms. Where d is constant only places beside the boundary are left.
+///
+/// # Errors
+/// [`LatticeError`] if atoms coincide or the work was cancelled.
+pub fn fill_holes<const D: usize>(
+    scatterer: &Scatterer<D>,
+    mut lattice: Lattice<D>,
+    distance: &NominalDistance<D>,
+    rounds: usize,
+    watch: &mut dyn Watch,
+) -> Result<Lattice<D>, LatticeError> {
+    if D == 3 {
+        for face in 0..6 {
+            fill_face(&mut lattice, face / 2, face % 2 == 1, distance, rounds, None, watch)?;
+        }
+    }
+    let spread = Spread { delaunay: &scatterer.delaunay, limit: scatterer.limit, rounds };
+    let field = |p: &Point<D>| distance.at(p);
+    let mut atoms = lattice.atoms().to_vec();
+    spread.complete(&mut atoms, lattice.bounds(), &field, watch)?;
+    for p in atoms.split_off(lattice.len()) {
+        lattice.push(p, ((1usize << D) - 1) as u8, 1.0);
+    }
+    Ok(lattice)
+}
+
+/// Adds atoms to one face of a box in 3-D, as a plane of its own; with random numbers, one at random
+/// first.
+fn fill_face<const D: usize>(
     lattice: &mut Lattice<D>,
     normal: usize,
     far: bool,
     distance: &NominalDistance<D>,
-    random: &mut Pcg64,
+    rounds: usize,
+    random: Option<&mut Pcg64>,
     watch: &mut dyn Watch,
 ) -> Result<(), LatticeError> {
     let bounds = *lattice.bounds();
@@ -116,9 +174,14 @@ fn scatter_face<const D: usize>(
         lattice.atoms().iter().filter(|p| p[normal] == level).map(|p| [p[a], p[b]]).collect();
     let plane = Bounds { min: [bounds.min[a], bounds.min[b]], max: [bounds.max[a], bounds.max[b]] };
     let flat = Scatterer::<2>::new();
-    let spread = Spread { delaunay: &flat.delaunay, limit: flat.limit };
+    let spread = Spread { delaunay: &flat.delaunay, limit: flat.limit, rounds };
     let field = |p: &Point<2>| distance.at(&lift(p));
-    for p in spread.fill(&rim, &plane, &field, random, watch)? {
+    let mut atoms = rim.clone();
+    if let Some(random) = random {
+        start(&mut atoms, &plane, &field, random);
+    }
+    spread.complete(&mut atoms, &plane, &field, watch)?;
+    for p in atoms.split_off(rim.len()) {
         lattice.push(lift(&p), 1 << a | 1 << b, 1.0);
     }
     Ok(())
@@ -127,6 +190,24 @@ fn scatter_face<const D: usize>(
 struct Spread<'a, const D: usize> {
     delaunay: &'a Delaunay<D>,
     limit: f64,
+    /// The most meshes to look at.
+    rounds: usize,
+}
+
+/// Adds a random atom near the middle, unless there is one within d.
+fn start<const D: usize>(
+    atoms: &mut Vec<Point<D>>,
+    bounds: &Bounds<D>,
+    distance: &impl Fn(&Point<D>) -> f64,
+    random: &mut Pcg64,
+) {
+    let first: Point<D> = std::array::from_fn(|k| {
+        bounds.min[k] + (0.25 + 0.5 * random.random::<f64>()) * (bounds.max[k] - bounds.min[k])
+    });
+    let near = atoms.iter().any(|q| distance_squared(q, &first) < distance(&first).powi(2));
+    if !near {
+        atoms.push(first);
+    }
 }
 
 /// A place where an atom is missing, and how much: r/d.
@@ -137,36 +218,27 @@ struct Hole<const D: usize> {
 }
 
 impl<const D: usize> Spread<'_, D> {
-    /// The atoms to add to `given` ones.
-    fn fill(
+    /// Adds atoms in the holes that the given ones leave.
+    fn complete(
         &self,
-        given: &[Point<D>],
+        atoms: &mut Vec<Point<D>>,
         bounds: &Bounds<D>,
         distance: &(impl Fn(&Point<D>) -> f64 + Sync),
-        random: &mut Pcg64,
         watch: &mut dyn Watch,
-    ) -> Result<Vec<Point<D>>, LatticeError> {
-        let mut atoms = given.to_vec();
-        let first: Point<D> = std::array::from_fn(|k| {
-            bounds.min[k] + (0.25 + 0.5 * random.random::<f64>()) * (bounds.max[k] - bounds.min[k])
-        });
-        let near = atoms.iter().any(|q| distance_squared(q, &first) < distance(&first).powi(2));
-        if !near {
-            atoms.push(first);
-        }
-        for round in 0..ROUND_LIMIT {
+    ) -> Result<(), LatticeError> {
+        for round in 0..self.rounds {
             check(watch, Phase::Grow, round as f64 / (round + 8) as f64, None)?;
-            let holes = self.holes(&atoms, bounds, distance, watch)?;
+            let holes = self.holes(atoms, bounds, distance, watch)?;
             if holes.is_empty() {
                 break;
             }
             let before = atoms.len();
-            self.plug(&holes, bounds, &mut atoms);
+            self.plug(&holes, bounds, atoms);
             if atoms.len() == before {
                 break;
             }
         }
-        Ok(atoms.split_off(given.len()))
+        Ok(())
     }
 
     /// Circumcentres inside the box whose r/d exceeds the limit, the worst first.
@@ -177,10 +249,7 @@ impl<const D: usize> Spread<'_, D> {
         distance: &(impl Fn(&Point<D>) -> f64 + Sync),
         watch: &mut dyn Watch,
     ) -> Result<Vec<Hole<D>>, LatticeError> {
-        let mesh = self.delaunay.connect(atoms, watch).map_err(|error| match error {
-            ConnectError::Cancelled(cancelled) => LatticeError::Cancelled(cancelled),
-            other => LatticeError::Connect(other.to_string()),
-        })?;
+        let mesh = connect(self.delaunay, atoms, watch)?;
         let mut holes: Vec<Hole<D>> = mesh
             .corners()
             .par_chunks_exact(D + 1)
