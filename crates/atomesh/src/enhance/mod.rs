@@ -20,7 +20,7 @@ mod scale;
 
 use crate::image::{Grid, Image, Samples, Stencil, Units, gaussian, magnitude};
 use crate::watch::{Cancelled, Phase, Watch, check};
-use quantile::Order;
+use quantile::{Order, Ranks};
 use rayon::prelude::*;
 use scale::{Ramp, UnitSamples};
 use serde::{Deserialize, Serialize};
@@ -198,11 +198,12 @@ pub fn enhance<const D: usize>(
     check(watch, Phase::Potential, 0.0, None)?;
     let unit = UnitSamples::new(image.samples())?;
     check(watch, Phase::Potential, 0.1, None)?;
+    let sign = if options.repel { -1.0 } else { 1.0 };
     let mut enhanced = match options.features {
         Features::None => Enhanced { values: vec![0.0; unit.len()], constant: false },
         _ if unit.is_constant() => Enhanced { values: vec![0.0; unit.len()], constant: true },
-        Features::Dark => unit.map(&Ramp::dark(&unit)),
-        Features::Bright => unit.map(&Ramp::bright(&unit)),
+        Features::Dark => unit.map(&Ramp::dark(&unit), sign),
+        Features::Bright => unit.map(&Ramp::bright(&unit), sign),
         Features::Edges => edges(&unit, image, options, watch)?,
     };
     check(watch, Phase::Potential, 0.8, None)?;
@@ -211,13 +212,13 @@ pub fn enhance<const D: usize>(
     let sigma = options.sigma(&grid);
     if sigma[0] > 0.0 && !flat {
         gaussian(&mut enhanced.values, grid.shape, sigma);
+        let (least, greatest) = if options.repel { (0.0, 1.0) } else { (-1.0, 0.0) };
+        enhanced.values.par_chunks_mut(BLOCK).for_each(|block| {
+            for b in block {
+                *b = b.clamp(least, greatest) + 0.0; // rounding may leave the range; no −0
+            }
+        });
     }
-    let sign = if options.repel { -1.0 } else { 1.0 };
-    enhanced.values.par_chunks_mut(BLOCK).for_each(|block| {
-        for b in block {
-            *b = sign * b.clamp(-1.0, 0.0) + 0.0; // rounding may leave the range; no −0
-        }
-    });
     check(watch, Phase::Potential, 1.0, None)?;
     Ok(enhanced)
 }
@@ -279,7 +280,8 @@ fn edges<const D: usize>(
         return Ok(Enhanced { values, constant: true });
     }
     let ramp = Ramp { background: 0.0, feature };
-    values.par_chunks_mut(BLOCK).for_each(|block| ramp.apply(block));
+    let sign = if options.repel { -1.0 } else { 1.0 };
+    values.par_chunks_mut(BLOCK).for_each(|block| ramp.apply(block, sign));
     Ok(Enhanced { values, constant: false })
 }
 

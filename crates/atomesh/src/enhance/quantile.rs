@@ -1,8 +1,9 @@
 //! Exact order statistics in O(N), without sorting or copying.
 //!
-//! The bits of numbers above 0 are in the numbers' own order. One pass counts their upper halves,
-//! which finds the half of the value wanted; a second counts the lower halves beneath it. Counts
-//! are whole numbers, so that threads may add them up in any order.
+//! Small integers are counted value by value, in one pass. The bits of real numbers above 0 are in the
+//! numbers' own order: one pass counts their upper halves, which finds the half of the value wanted; a
+//! second counts the lower halves beneath it. Counts are whole numbers, so that threads may add them up in
+//! any order.
 
 use rayon::prelude::*;
 
@@ -22,6 +23,52 @@ pub(super) struct Ranked {
     pub(super) above: usize,
 }
 
+/// Samples that can be asked for their order.
+pub(super) trait Ranks {
+    /// The sample with `rank` others before it in ascending order. Ranks beyond the last are the
+    /// last; 0 without samples.
+    fn ranked(&self, rank: usize) -> Ranked;
+}
+
+/// Samples of few values: how many there are of each, in ascending order of the values.
+pub(super) struct Levels {
+    values: Vec<f32>,
+    counts: Vec<u64>,
+}
+
+impl Levels {
+    /// Counts `samples`, whose `level` is a place in `values`.
+    pub(super) fn new<T: Copy + Sync>(
+        samples: &[T],
+        level: impl Fn(T) -> u16 + Sync,
+        values: Vec<f32>,
+    ) -> Self {
+        let empty = || vec![0u64; values.len()];
+        let count_part = |mut counts: Vec<u64>, part: &[T]| {
+            // two counts in turn: one after the other of the same level would wait for each other
+            let mut others = vec![0u64; values.len()];
+            for pair in part.chunks(2) {
+                counts[level(pair[0]) as usize] += 1;
+                if let &[_, other] = pair {
+                    others[level(other) as usize] += 1;
+                }
+            }
+            add(counts, others)
+        };
+        let counts = samples.par_chunks(PART).fold(empty, count_part).reduce(empty, add);
+        Self { values, counts }
+    }
+}
+
+impl Ranks for Levels {
+    fn ranked(&self, rank: usize) -> Ranked {
+        let count = self.counts.iter().sum::<u64>() as usize;
+        let (level, below) = locate(&self.counts, rank.min(count.saturating_sub(1)));
+        let above = count - below - self.counts[level as usize] as usize;
+        Ranked { value: if count > 0 { self.values[level as usize] } else { 0.0 }, below, above }
+    }
+}
+
 /// The samples, none negative, that `fill(start, out)` writes, ready to be asked for their order.
 pub(super) struct Order<F> {
     count: usize,
@@ -35,10 +82,10 @@ impl<F: Fn(usize, &mut [f32]) + Sync> Order<F> {
         let upper_halves = histogram(count, &fill, |bits| Some(bits >> 16));
         Self { count, fill, upper_halves }
     }
+}
 
-    /// The sample with `rank` others before it in ascending order. Ranks beyond the last are the
-    /// last; 0 without samples.
-    pub(super) fn ranked(&self, rank: usize) -> Ranked {
+impl<F: Fn(usize, &mut [f32]) + Sync> Ranks for Order<F> {
+    fn ranked(&self, rank: usize) -> Ranked {
         let rank = rank.min(self.count.saturating_sub(1));
         let (upper, before_upper) = locate(&self.upper_halves, rank);
         let lower_halves = histogram(self.count, &self.fill, |bits| {
@@ -74,23 +121,32 @@ fn histogram(
     let count_part = |mut bins: Vec<u64>, part: usize| {
         let end = count.min((part + 1) * PART);
         let mut block = [0.0; BLOCK];
+        let mut zeros = 0;
         for start in (part * PART..end).step_by(BLOCK) {
             let block = &mut block[..BLOCK.min(end - start)];
             fill(start, block);
             for value in block {
                 // + 0.0 turns −0 into 0, whose bits are in order
-                if let Some(bin) = bin((*value + 0.0).to_bits()) {
+                let bits = (*value + 0.0).to_bits();
+                if bits == 0 {
+                    zeros += 1; // there may be many in a row, and one would wait for another
+                } else if let Some(bin) = bin(bits) {
                     bins[bin as usize] += 1;
                 }
             }
         }
+        if let Some(bin) = bin(0) {
+            bins[bin as usize] += zeros;
+        }
         bins
     };
-    let add = |mut a: Vec<u64>, b: Vec<u64>| {
-        a.iter_mut().zip(b).for_each(|(a, b)| *a += b);
-        a
-    };
     (0..count.div_ceil(PART)).into_par_iter().fold(empty, count_part).reduce(empty, add)
+}
+
+/// The sums of counts.
+fn add(mut a: Vec<u64>, b: Vec<u64>) -> Vec<u64> {
+    a.iter_mut().zip(b).for_each(|(a, b)| *a += b);
+    a
 }
 
 #[cfg(test)]
@@ -122,6 +178,22 @@ mod tests {
         }
     }
 
+    proptest! {
+        #[test]
+        fn counted_levels_have_the_order_of_their_values(
+            samples in prop::collection::vec(
+                prop_oneof![any::<i8>(), Just(-3i8), Just(i8::MIN), Just(i8::MAX)], 1..300
+            ),
+            rank in 0usize..300,
+        ) {
+            let value = |s: i8| f32::from(s) + 128.0;
+            let values = (i8::MIN..=i8::MAX).map(value).collect();
+            let levels = Levels::new(&samples, |s| (s as u8 ^ 0x80).into(), values);
+            let reals: Vec<f32> = samples.iter().map(|&s| value(s)).collect();
+            prop_assert_eq!(levels.ranked(rank), of(&reals, rank));
+        }
+    }
+
     #[test]
     fn several_parts_add_up() {
         let values: Vec<f32> = (0..2 * PART + 77).map(|i| (i % 1000) as f32).collect();
@@ -132,6 +204,8 @@ mod tests {
 
     #[test]
     fn no_samples_have_rank_zero() {
-        assert_eq!(of(&[], 3), Ranked { value: 0.0, below: 0, above: 0 });
+        let none = Ranked { value: 0.0, below: 0, above: 0 };
+        assert_eq!(of(&[], 3), none);
+        assert_eq!(Levels::new(&[0u8; 0], u16::from, vec![7.0; 256]).ranked(3), none);
     }
 }

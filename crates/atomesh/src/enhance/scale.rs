@@ -1,6 +1,6 @@
 //! Scaling of samples: where the background is, and where a full feature.
 
-use super::quantile::Order;
+use super::quantile::{Levels, Order, Ranks};
 use super::{BLOCK, EnhanceError, Enhanced};
 use crate::image::Samples;
 use rayon::prelude::*;
@@ -16,6 +16,18 @@ pub(super) struct UnitSamples<'a> {
     half_min: f64,
     half_range: f64,
     scale: f64,
+    /// What each value of 8-bit samples becomes, from the least on; empty for other samples.
+    levels: Vec<f32>,
+}
+
+/// The place of a signed byte among them, the least first.
+fn signed_place(s: i8) -> u8 {
+    s as u8 ^ 0x80
+}
+
+/// The same of a signed 16-bit integer.
+fn signed_place_16(s: i16) -> u16 {
+    s as u16 ^ 0x8000
 }
 
 impl<'a> UnitSamples<'a> {
@@ -29,7 +41,14 @@ impl<'a> UnitSamples<'a> {
         }
         let half_min = 0.5 * range.min;
         let half_range = 0.5 * range.max - half_min;
-        Ok(Self { samples, half_min, half_range, scale: half_range.recip() })
+        let scale = half_range.recip();
+        let mut unit = Self { samples, half_min, half_range, scale, levels: Vec::new() };
+        unit.levels = match samples {
+            Samples::U8(_) => (0..=u8::MAX).map(|s| unit.of(s.into())).collect(),
+            Samples::I8(_) => (i8::MIN..=i8::MAX).map(|s| unit.of(s.into())).collect(),
+            _ => Vec::new(),
+        };
+        Ok(unit)
     }
 
     pub(super) fn len(&self) -> usize {
@@ -40,20 +59,53 @@ impl<'a> UnitSamples<'a> {
         self.half_range < f64::MIN_POSITIVE // the reciprocal of less would overflow
     }
 
+    /// What a sample becomes.
+    #[inline]
+    fn of(&self, sample: f64) -> f32 {
+        ((0.5 * sample - self.half_min) * self.scale) as f32
+    }
+
     pub(super) fn fill(&self, start: usize, out: &mut [f32]) {
-        let (min, scale) = (self.half_min, self.scale);
-        self.samples.map_into(start, out, |s| ((0.5 * s - min) * scale) as f32);
+        let within = start..start + out.len();
+        match self.samples {
+            Samples::U8(v) => self.look_up(&v[within], out, |s| s),
+            Samples::I8(v) => self.look_up(&v[within], out, signed_place),
+            others => others.map_into(start, out, |s| self.of(s)),
+        }
     }
 
-    fn order(&self) -> Order<impl Fn(usize, &mut [f32]) + Sync> {
-        Order::new(self.len(), |start, out: &mut [f32]| self.fill(start, out))
+    #[inline]
+    fn look_up<T: Copy>(&self, samples: &[T], out: &mut [f32], place: impl Fn(T) -> u8) {
+        let Ok(levels) = <&[f32; 256]>::try_from(self.levels.as_slice()) else { return };
+        for (out, &s) in out.iter_mut().zip(samples) {
+            *out = levels[usize::from(place(s))];
+        }
     }
 
-    pub(super) fn map(&self, ramp: &Ramp) -> Enhanced {
+    fn ranks(&self) -> Box<dyn Ranks + '_> {
+        match self.samples {
+            Samples::U8(v) => Box::new(Levels::new(v, u16::from, self.levels.clone())),
+            Samples::I8(v) => {
+                let place = |s| signed_place(s).into();
+                Box::new(Levels::new(v, place, self.levels.clone()))
+            }
+            Samples::U16(v) => {
+                let values = (0..=u16::MAX).map(|s| self.of(s.into())).collect();
+                Box::new(Levels::new(v, |s| s, values))
+            }
+            Samples::I16(v) => {
+                let values = (i16::MIN..=i16::MAX).map(|s| self.of(s.into())).collect();
+                Box::new(Levels::new(v, signed_place_16, values))
+            }
+            _ => Box::new(Order::new(self.len(), |start, out: &mut [f32]| self.fill(start, out))),
+        }
+    }
+
+    pub(super) fn map(&self, ramp: &Ramp, sign: f32) -> Enhanced {
         let mut values = vec![0.0; self.len()];
         values.par_chunks_mut(BLOCK).enumerate().for_each(|(block, out)| {
             self.fill(block * BLOCK, out);
-            ramp.apply(out);
+            ramp.apply(out, sign);
         });
         Enhanced { values, constant: false }
     }
@@ -67,7 +119,7 @@ pub(super) struct Ramp {
 
 impl Ramp {
     pub(super) fn dark(unit: &UnitSamples) -> Self {
-        let order = unit.order();
+        let order = unit.ranks();
         let median = order.ranked(unit.len() / 2);
         if median.below == 0 {
             return Self { background: 1.0, feature: 0.0 };
@@ -77,7 +129,7 @@ impl Ramp {
     }
 
     pub(super) fn bright(unit: &UnitSamples) -> Self {
-        let order = unit.order();
+        let order = unit.ranks();
         let median = order.ranked(unit.len() / 2);
         if median.above == 0 {
             return Self { background: 0.0, feature: 1.0 };
@@ -86,10 +138,12 @@ impl Ramp {
         Self { background: median.value, feature: order.ranked(unit.len() - 1 - clipped).value }
     }
 
-    pub(super) fn apply(&self, values: &mut [f32]) {
+    /// Turns unit samples into b times `sign`, 1 or −1.
+    pub(super) fn apply(&self, values: &mut [f32], sign: f32) {
         let depth = self.feature - self.background; // its sign says which side
         for v in values {
-            *v = (-(*v - self.background) / depth).clamp(-1.0, 0.0);
+            // no −0
+            *v = sign * (-(*v - self.background) / depth).clamp(-1.0, 0.0) + 0.0;
         }
     }
 }

@@ -74,6 +74,35 @@ fn range_of<T: Sync>(samples: &[T], part: impl Fn(&[T]) -> Range + Sync + Send) 
     samples.par_chunks(1 << 16).map(part).reduce(|| EMPTY, Range::union)
 }
 
+/// Samples looked at side by side.
+const LANES: usize = 16;
+
+/// The range of samples that are all finite, else `None`: without a branch, so that it is vectorised.
+fn finite_range(samples: &[f32]) -> Option<Range> {
+    let (mut min, mut max) = ([f32::INFINITY; LANES], [f32::NEG_INFINITY; LANES]);
+    let mut odd = [0.0f32; LANES];
+    let mut look = |block: &[f32; LANES]| {
+        for i in 0..LANES {
+            let s = block[i];
+            min[i] = if s < min[i] { s } else { min[i] };
+            max[i] = if s > max[i] { s } else { max[i] };
+            odd[i] += s * 0.0; // NaN from the first NaN or infinity on
+        }
+    };
+    let (blocks, rest) = samples.as_chunks();
+    blocks.iter().for_each(&mut look);
+    let &first = samples.first()?;
+    let mut last = [first; LANES];
+    last[..rest.len()].copy_from_slice(rest);
+    look(&last);
+    let range = Range {
+        min: min.into_iter().fold(f32::INFINITY, f32::min).into(),
+        max: max.into_iter().fold(f32::NEG_INFINITY, f32::max).into(),
+        ..EMPTY
+    };
+    odd.iter().all(|&o| o == 0.0).then_some(range)
+}
+
 /// Runs the same expression on whichever vector the samples hold.
 macro_rules! each {
     ($samples:expr, $v:ident => $body:expr) => {
@@ -166,27 +195,26 @@ impl Samples {
     /// The least and greatest sample, and the count of those that are not finite.
     pub fn range(&self) -> Range {
         macro_rules! whole {
-            ($v:expr) => {
+            ($v:expr, $number:ident) => {
                 range_of($v, |part| {
-                    let (min, max) = (part.iter().min().copied(), part.iter().max().copied());
-                    Range {
-                        min: min.map_or(f64::NAN, f64::from),
-                        max: max.map_or(f64::NAN, f64::from),
-                        ..EMPTY
-                    }
+                    let ends = ($number::MAX, $number::MIN);
+                    let (min, max) = part.iter().fold(ends, |(a, b), &s| (a.min(s), b.max(s)));
+                    Range { min: min.into(), max: max.into(), ..EMPTY }
                 })
             };
         }
         match self {
-            Samples::U8(v) => whole!(v),
-            Samples::I8(v) => whole!(v),
-            Samples::U16(v) => whole!(v),
-            Samples::I16(v) => whole!(v),
-            Samples::U32(v) => whole!(v),
-            Samples::I32(v) => whole!(v),
-            Samples::F32(v) => {
-                range_of(v, |part| part.iter().fold(EMPTY, |r, &s| r.with(f64::from(s))))
-            }
+            Samples::U8(v) => whole!(v, u8),
+            Samples::I8(v) => whole!(v, i8),
+            Samples::U16(v) => whole!(v, u16),
+            Samples::I16(v) => whole!(v, i16),
+            Samples::U32(v) => whole!(v, u32),
+            Samples::I32(v) => whole!(v, i32),
+            Samples::F32(v) => range_of(v, |part| {
+                finite_range(part).unwrap_or_else(|| {
+                    part.iter().fold(EMPTY, |range, &s| range.with(f64::from(s)))
+                })
+            }),
             Samples::F64(v) => range_of(v, |part| part.iter().fold(EMPTY, |r, &s| r.with(s))),
         }
     }
@@ -226,5 +254,35 @@ impl Samples {
             };
         }
         gathered!(U8, I8, U16, I16, U32, I32, F32, F64)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn the_range_of_singles_is_that_of_one_after_another() {
+        let plain: Vec<f32> = (0..200).map(|i| ((i * 37) % 101) as f32 - 50.5).collect();
+        for count in [1, 15, 16, 17, 200] {
+            for odd in [None, Some(f32::NAN), Some(f32::INFINITY), Some(f32::NEG_INFINITY)] {
+                for place in [0, count / 2, count - 1] {
+                    let mut samples = plain[..count].to_vec();
+                    samples[place] = odd.unwrap_or(samples[place]);
+                    let slow = samples.iter().fold(EMPTY, |r, &s| r.with(f64::from(s)));
+                    assert_eq!(finite_range(&samples).is_some(), odd.is_none());
+                    let range = Samples::F32(samples).range();
+                    assert_eq!(format!("{range:?}"), format!("{slow:?}"), "{count} {place}");
+                }
+            }
+        }
+    }
+
+    #[test]
+    fn whole_numbers_have_their_ends_as_range() {
+        let range = Samples::I8(vec![3, -128, 127, 0]).range();
+        assert_eq!((range.min, range.max), (-128.0, 127.0));
+        let none = Samples::U16(Vec::new()).range();
+        assert!(none.min.is_nan() && none.max.is_nan());
     }
 }

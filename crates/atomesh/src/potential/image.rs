@@ -92,7 +92,7 @@ impl<const D: usize> ImagePotential<D> {
             let (expected, found) = (grid.sample_count(), samples.len());
             return Err(PotentialError::SampleCount { expected, found });
         }
-        if let Some(index) = samples.iter().position(|b| !(-1.0..=1.0).contains(b)) {
+        if let Some(index) = first_outside(&samples) {
             return Err(PotentialError::OutOfRange { index, value: samples[index] });
         }
         let spline = match interpolation {
@@ -238,6 +238,15 @@ impl<const D: usize> ImagePotential<D> {
         }
         value[0]
     }
+}
+
+/// The index of the first sample that is outside −1…1, or NaN.
+fn first_outside(samples: &[f32]) -> Option<usize> {
+    let inside = |b: &f32| (-1.0..=1.0).contains(b);
+    // blocks are tested without a branch for each sample, so that the test is vectorised
+    let sound = |block: &[f32]| block.iter().fold(true, |all, b| all & inside(b));
+    let block = samples.par_chunks(1 << 14).position_first(|block| !sound(block))?;
+    (block << 14..samples.len()).find(|&i| !inside(&samples[i]))
 }
 
 /// Half the difference of the neighbours along an axis, one-sided at the ends; per sample.
