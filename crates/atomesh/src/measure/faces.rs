@@ -2,11 +2,61 @@
 
 use crate::mesh::Mesh;
 use rayon::prelude::*;
+use std::ops::Range;
+
+/// The most points whose faces are sought at once: so few faces are held more than once.
+const MOST_POINTS: usize = 1 << 19;
 
 /// The distinct faces with `K` corners of all cells, corners ascending, in lexicographic order.
 ///
-/// `K = 2` gives the edges, `K = D` the facets (in 2-D the same). Cost: O(n log n) in cells.
+/// `K = 2` gives the edges, `K = D` the facets (in 2-D the same). Every part of the points looks for the
+/// faces that it leads among all cells, and sorts those of one point at a time. Cost: O(n) in cells, of
+/// few cells a point.
 pub(super) fn faces<const D: usize, const K: usize>(mesh: &Mesh<D>) -> Vec<[u32; K]> {
+    let count = mesh.points().len();
+    let parts = count.div_ceil(MOST_POINTS).next_multiple_of(rayon::current_num_threads());
+    let each = count.div_ceil(parts.max(1)).max(1);
+    let part = |p: usize| (p * each) as u32..((p + 1) * each).min(count) as u32;
+    let found: Vec<Vec<[u32; K]>> =
+        (0..count.div_ceil(each)).into_par_iter().map(|p| led_by(mesh, part(p))).collect();
+    found.concat()
+}
+
+/// The distinct faces whose least corner is in `part`.
+fn led_by<const D: usize, const K: usize>(mesh: &Mesh<D>, part: Range<u32>) -> Vec<[u32; K]> {
+    let mut starts = vec![0; part.len() + 1];
+    each_face(mesh, &part, |face: [u32; K]| starts[(face[0] - part.start) as usize + 1] += 1);
+    for point in 0..part.len() {
+        starts[point + 1] += starts[point];
+    }
+    let mut faces = vec![[0; K]; starts[part.len()]];
+    let mut next = starts.clone();
+    each_face(mesh, &part, |face| {
+        let at = &mut next[(face[0] - part.start) as usize];
+        faces[*at] = face;
+        *at += 1;
+    });
+    let mut kept = 0;
+    for of_point in starts.windows(2) {
+        faces[of_point[0]..of_point[1]].sort_unstable();
+        for i in of_point[0]..of_point[1] {
+            if i == of_point[0] || faces[i] != faces[kept - 1] {
+                faces[kept] = faces[i];
+                kept += 1;
+            }
+        }
+    }
+    faces.truncate(kept);
+    faces
+}
+
+/// Calls `visit` with every face of every cell whose least corner is in `part`, corners ascending.
+#[inline(always)]
+fn each_face<const D: usize, const K: usize>(
+    mesh: &Mesh<D>,
+    part: &Range<u32>,
+    mut visit: impl FnMut([u32; K]),
+) {
     // each face of a simplex is a choice of K of its D + 1 corners
     let choices: Vec<[usize; K]> = (0u32..1 << (D + 1))
         .filter(|set| set.count_ones() as usize == K)
@@ -15,17 +65,20 @@ pub(super) fn faces<const D: usize, const K: usize>(mesh: &Mesh<D>) -> Vec<[u32;
             std::array::from_fn(|_| members.next().unwrap_or(0))
         })
         .collect();
-    let mut faces = Vec::with_capacity(mesh.cell_count() * choices.len());
     for cell in mesh.cells() {
+        let (least, greatest) =
+            cell.iter().fold((u32::MAX, 0), |(a, b), &corner| (a.min(corner), b.max(corner)));
+        if least >= part.end || greatest < part.start {
+            continue;
+        }
         for choice in &choices {
             let mut face = choice.map(|k| cell[k]);
             face.sort_unstable();
-            faces.push(face);
+            if part.contains(&face[0]) {
+                visit(face);
+            }
         }
     }
-    faces.par_sort_unstable();
-    faces.dedup();
-    faces
 }
 
 #[cfg(test)]
@@ -47,5 +100,40 @@ mod tests {
         let mesh = Mesh::new(points, vec![0, 1, 2, 3, 1, 2, 3, 4]).unwrap();
         assert_eq!(faces::<3, 3>(&mesh).len(), 7);
         assert_eq!(faces::<3, 2>(&mesh).len(), 9);
+    }
+
+    /// The definition: all faces, sorted.
+    fn listed<const D: usize, const K: usize>(mesh: &Mesh<D>) -> Vec<[u32; K]> {
+        let mut all = Vec::new();
+        for cell in mesh.cells() {
+            for set in (0u32..1 << (D + 1)).filter(|set| set.count_ones() as usize == K) {
+                let mut face: Vec<u32> =
+                    (0..=D).filter(|k| set >> k & 1 == 1).map(|k| cell[k]).collect();
+                face.sort_unstable();
+                all.push(face.try_into().unwrap());
+            }
+        }
+        all.sort_unstable();
+        all.dedup();
+        all
+    }
+
+    #[test]
+    fn faces_are_those_of_the_sorted_list_at_any_thread_count() {
+        // any corners will do, and some points are none
+        let points = vec![[0.0; 3]; 90];
+        let corner = |i: u32| (i * i % 89 + i / 7) % 90;
+        let corners: Vec<u32> =
+            (0..400).flat_map(|c| [0, 1, 2, 3].map(|k| corner(5 * c + 11 * k))).collect();
+        let mesh = Mesh::new(points, corners).unwrap();
+        for threads in [1, 3] {
+            let pool = rayon::ThreadPoolBuilder::new().num_threads(threads).build().unwrap();
+            pool.install(|| {
+                assert_eq!(faces::<3, 2>(&mesh), listed(&mesh));
+                assert_eq!(faces::<3, 3>(&mesh), listed(&mesh));
+            });
+        }
+        let empty = Mesh::<2>::new(Vec::new(), Vec::new()).unwrap();
+        assert!(faces::<2, 2>(&empty).is_empty());
     }
 }

@@ -11,7 +11,7 @@
 
 use super::MeasureError;
 use super::faces::faces;
-use super::statistics::{Histogram, percentile, sum};
+use super::statistics::{Histogram, least, percentile, sum, sums};
 use crate::geometry::linear::invert;
 use crate::geometry::{Bounds, Point, difference, dot};
 use crate::mesh::Mesh;
@@ -165,11 +165,11 @@ pub fn shapes<const D: usize>(
             },
         );
     }
-    let mut sizes: Vec<f64> = shapes.iter().map(|s| s.measure.abs()).collect();
+    let mut sizes: Vec<f64> = shapes.par_iter().map(|s| s.measure.abs()).collect();
     let limit = FLAT * percentile(&mut sizes, 50.0);
-    for shape in shapes.iter_mut().filter(|s| s.measure.abs() <= limit) {
+    shapes.par_iter_mut().filter(|s| s.measure.abs() <= limit).for_each(|shape| {
         *shape = CellShape { measure: shape.measure, ..CellShape::default() };
-    }
+    });
     Ok(shapes)
 }
 
@@ -187,35 +187,51 @@ pub fn shape<const D: usize>(
     let shapes = shapes(mesh, watch)?;
     let cells = shapes.len();
     let total_measure = sum(0..cells, &|i| shapes[i].measure.abs());
-
-    let mut values: Vec<f64> = shapes.iter().map(|s| s.quality).collect();
-    let q_p1 = percentile(&mut values, 1.0);
-    let q_min = percentile(&mut values, 0.0);
-    values.iter_mut().zip(&shapes).for_each(|(v, s)| *v = s.least_angle);
-    let angle_p1 = percentile(&mut values, 1.0);
-    let angle_p5 = percentile(&mut values, 5.0);
-    let angle_min = percentile(&mut values, 0.0);
+    let q_mean = sum(0..cells, &|i| shapes[i].quality) / cells as f64;
+    let (qualities, angles) = rayon::join(
+        || Spread::of(shapes.par_iter().map(|s| s.quality).collect(), [1.0], (0.05, 20)),
+        || Spread::of(shapes.par_iter().map(|s| s.least_angle).collect(), [1.0, 5.0], (5.0, 15)),
+    );
+    let inverted = shapes.par_iter().filter(|s| s.measure < 0.0).count();
+    let flat = shapes.par_iter().filter(|s| s.quality == 0.0).count();
+    drop(shapes);
 
     check(watch, Phase::Measure, 1.0, None)?;
     let edges = EdgeLengths::of(mesh);
     Ok(ShapeReport {
         points: mesh.points().len(),
         cells,
-        inverted: shapes.iter().filter(|s| s.measure < 0.0).count(),
-        flat: shapes.iter().filter(|s| s.quality == 0.0).count(),
+        inverted,
+        flat,
         total_measure,
         volume_error: bounds.map(|b| (total_measure - b.measure()).abs() / b.measure()),
-        q_mean: sum(0..cells, &|i| shapes[i].quality) / cells as f64,
-        q_p1,
-        q_min,
-        angle_min,
-        angle_p1,
-        angle_p5,
+        q_mean,
+        q_p1: qualities.percentiles[0],
+        q_min: qualities.least,
+        angle_min: angles.least,
+        angle_p1: angles.percentiles[0],
+        angle_p5: angles.percentiles[1],
         edge_mean: edges.mean,
         edge_rms_per_axis: edges.rms_per_axis,
-        q_histogram: Histogram::of(shapes.iter().map(|s| s.quality), 0.05, 20),
-        angle_histogram: Histogram::of(shapes.iter().map(|s| s.least_angle), 5.0, 15),
+        q_histogram: qualities.histogram,
+        angle_histogram: angles.histogram,
     })
+}
+
+/// How values are spread.
+struct Spread<const N: usize> {
+    least: f64,
+    percentiles: [f64; N],
+    histogram: Histogram,
+}
+
+impl<const N: usize> Spread<N> {
+    /// The percentiles asked for, ascending, and counts in bins given by their width and number.
+    fn of(mut values: Vec<f64>, percents: [f64; N], (width, bins): (f64, usize)) -> Self {
+        let histogram = Histogram::of(&values, width, bins);
+        let least = least(&values);
+        Self { least, percentiles: percents.map(|p| percentile(&mut values, p)), histogram }
+    }
 }
 
 /// Lengths of the distinct edges.
@@ -234,9 +250,9 @@ impl EdgeLengths {
         let count = edges.len() as f64;
         Self {
             mean: sum(0..edges.len(), &|i| dot(&edge(i), &edge(i)).sqrt()) / count,
-            rms_per_axis: (0..D)
-                .map(|k| (sum(0..edges.len(), &|i| edge(i)[k].powi(2)) / count).sqrt())
-                .collect(),
+            rms_per_axis: sums(0..edges.len(), &|i| edge(i).map(|x| x.powi(2)))
+                .map(|squared| (squared / count).sqrt())
+                .to_vec(),
         }
     }
 }

@@ -1,5 +1,6 @@
 //! Means, percentiles and histograms, summed in a fixed order.
 
+use rayon::prelude::*;
 use std::ops::Range;
 
 /// Up to this many values are summed one after another.
@@ -22,6 +23,32 @@ pub(super) fn sum(range: Range<usize>, value: &(impl Fn(usize) -> f64 + Sync)) -
         rayon::join(|| sum(first, value), || sum(second, value))
     };
     first + second
+}
+
+/// [`sum`] of several values at once.
+pub(super) fn sums<const N: usize>(
+    range: Range<usize>,
+    values: &(impl Fn(usize) -> [f64; N] + Sync),
+) -> [f64; N] {
+    let count = range.len();
+    let add = |a: [f64; N], b: [f64; N]| std::array::from_fn(|k| a[k] + b[k]);
+    if count <= SHORT {
+        return range.map(values).fold([0.0; N], add);
+    }
+    let middle = range.start + count / 2;
+    let (first, second) = (range.start..middle, middle..range.end);
+    let (first, second) = if count <= SERIAL {
+        (sums(first, values), sums(second, values))
+    } else {
+        rayon::join(|| sums(first, values), || sums(second, values))
+    };
+    add(first, second)
+}
+
+/// The least of the values; infinite if there are none.
+pub(super) fn least(values: &[f64]) -> f64 {
+    let of = |part: &[f64]| part.iter().copied().fold(f64::INFINITY, f64::min);
+    values.par_chunks(SERIAL).map(of).reduce(|| f64::INFINITY, f64::min)
 }
 
 /// The percentile `percent` in 0..=100, linear between ranks as in NumPy's default; reorders
@@ -51,11 +78,19 @@ pub struct Histogram {
 
 impl Histogram {
     /// Counts values, none of which is below 0.
-    pub(super) fn of(values: impl Iterator<Item = f64>, width: f64, bins: usize) -> Self {
-        let mut counts = vec![0; bins];
-        for value in values {
-            counts[((value / width) as usize).min(bins - 1)] += 1;
-        }
+    pub(super) fn of(values: &[f64], width: f64, bins: usize) -> Self {
+        let part = |values: &[f64]| {
+            let mut counts = vec![0; bins];
+            for value in values {
+                counts[((value / width) as usize).min(bins - 1)] += 1;
+            }
+            counts
+        };
+        let add = |mut a: Vec<u64>, b: Vec<u64>| {
+            a.iter_mut().zip(b).for_each(|(a, b)| *a += b);
+            a
+        };
+        let counts = values.par_chunks(SERIAL).map(part).reduce(|| vec![0; bins], add);
         Self { width, counts }
     }
 }
@@ -89,8 +124,18 @@ mod tests {
     }
 
     #[test]
+    fn sums_of_several_values_are_the_sums_of_each() {
+        let value = |i: usize| [1.0 / (i as f64 + 1.0), (i as f64).sin()];
+        for count in [0, 1, 64, 65, 9000, 20_001] {
+            let both = sums(0..count, &value);
+            assert_eq!(both, [sum(0..count, &|i| value(i)[0]), sum(0..count, &|i| value(i)[1])]);
+        }
+        assert_eq!(least(&[3.0, -1.0, 2.0]), -1.0);
+    }
+
+    #[test]
     fn bins_hold_their_lower_end_and_the_last_holds_the_rest() {
-        let h = Histogram::of([0.0, 0.24, 0.25, 0.99, 1.0].into_iter(), 0.25, 4);
+        let h = Histogram::of(&[0.0, 0.24, 0.25, 0.99, 1.0], 0.25, 4);
         assert_eq!(h.counts, [2, 1, 0, 2]);
     }
 }
