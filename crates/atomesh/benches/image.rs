@@ -26,6 +26,9 @@ fn image_work(criterion: &mut Criterion) {
     }
     group.bench_function("gaussian", |b| b.iter(|| gaussian(&mut values, SHAPE, [2.0; 3])));
 
+    let single = Samples::F32(values);
+    group.bench_function("range_f32", |b| b.iter(|| single.range()));
+
     let samples = Samples::U8(layers());
     let grid = Grid { shape: SHAPE, step: [1.0; 3] };
     group.bench_function("gradient_gaussian", |b| {
@@ -39,6 +42,11 @@ fn image_work(criterion: &mut Criterion) {
         let options = FeatureOptions { features, ..Default::default() };
         group.bench_function(name, |b| b.iter(|| enhance(&image, &options, &mut Silent)));
     }
+    let Ok(image) = Image::new(frame, single) else { return };
+    let options = FeatureOptions { features: Features::Dark, ..Default::default() };
+    group.bench_function("enhance_dark_f32", |b| {
+        b.iter(|| enhance(&image, &options, &mut Silent));
+    });
     group.finish();
 }
 

@@ -98,8 +98,13 @@ fn draw<const D: usize>(
     options.blur = args.blur;
     options.bytes = bytes;
     let samples = shape.iter().fold(1u64, |n, &s| n.saturating_mul(s as u64));
-    // single precision, and the rounded bytes beside it
-    let needed = samples.saturating_mul(if bytes { 5 } else { 4 });
+    // bytes are drawn at once unless they are blurred, in single precision
+    let each = match (bytes, args.blur > 0.0) {
+        (true, false) => 1,
+        (true, true) => 5,
+        (false, _) => 4,
+    };
+    let needed = samples.saturating_mul(each);
     if memory::available().is_some_and(|available| needed > available) {
         let needed = memory::text(needed);
         let message = format!("the image needs {needed} of memory, more than there is");

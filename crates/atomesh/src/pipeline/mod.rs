@@ -42,6 +42,7 @@ use crate::mesh::{Mesh, merge_duplicates};
 use crate::optimize::{EngineKind, Fields, optimize};
 use crate::potential::{ImagePotential, ImageWeight, Interpolation};
 use crate::watch::{Phase, Watch, check};
+use rayon::prelude::*;
 
 /// What a mesh is made from. Images other than the first must have its shape; its frame counts.
 #[derive(Clone, Copy)]
@@ -242,10 +243,11 @@ impl<const D: usize> Prepared<'_, D> {
         let (points, _) = merge_duplicates(lattice.atoms());
         let mesh = self.method.delaunay().connect(&points, watch)?;
         drop((lattice, points));
-        let distance = mesh.points().iter().map(|p| self.distance.at(p) as f32).collect();
+        let points = mesh.points().par_iter().with_min_len(1 << 10);
+        let distance = points.clone().map(|p| self.distance.at(p) as f32).collect();
         let (low, high) = self.potential.range(); // a spline passes beyond it at jumps
         let at = |p| (self.potential.value(p) as f32).clamp(low, high);
-        let potential = mesh.points().iter().map(at).collect();
+        let potential = points.map(at).collect();
         Ok(Outcome {
             mesh,
             distance_at_points: distance,
@@ -283,9 +285,9 @@ pub fn lattice_mesh<const D: usize>(mesh: &Mesh<D>, frame: &Frame<D>, units: Uni
 fn moved<const D: usize>(
     mesh: &Mesh<D>,
     mirrored: bool,
-    to: impl Fn(&Point<D>) -> Point<D>,
+    to: impl Fn(&Point<D>) -> Point<D> + Send + Sync,
 ) -> Mesh<D> {
-    let points = mesh.points().iter().map(to).collect();
+    let points = mesh.points().par_iter().with_min_len(1 << 10).map(to).collect();
     let mut corners = mesh.corners().to_vec();
     if mirrored {
         corners.chunks_exact_mut(D + 1).for_each(|cell| cell.swap(D - 1, D));

@@ -162,7 +162,12 @@ pub(super) fn faults<const D: usize>(canvas: &Canvas<D>, random: &mut Random) ->
     let drawn = features.clone();
     let canvas = *canvas;
     let shade = move |p: &Point<D>| {
-        let nearest = drawn.iter().map(|f| f.geometry.distance(p)).fold(f64::INFINITY, f64::min);
+        let nearest = drawn.iter().fold(canvas.line_reach(), |nearest, f| {
+            // what is farther than another need not be known
+            let Geometry::Disk { center, normal, .. } = &f.geometry else { return nearest };
+            let height = dot(&difference(p, center), normal).abs();
+            if height < nearest { nearest.min(f.geometry.distance(p)) } else { nearest }
+        });
         canvas.line(nearest)
     };
     Sketch { features, layers: Some(layers), shade: Box::new(shade) }

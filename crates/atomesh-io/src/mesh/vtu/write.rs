@@ -129,9 +129,10 @@ fn piece<'a, const D: usize>(head: &mut Head<'a>, data: &MeshData<'a, D>) {
 }
 
 /// Writes one array: the number of blocks, the bytes of a block, of the last one if it is shorter, the
-/// compressed bytes of each, and the blocks. `step` is told the share that is done.
+/// compressed bytes of each, and the blocks. The lengths are known last, and so written last: only a few
+/// blocks are held at a time. `step` is told the share that is done.
 fn write_array(
-    out: &mut impl Write,
+    out: &mut (impl Write + Seek),
     column: &Column,
     step: &mut dyn FnMut(f64) -> Result<(), MeshWriteError>,
 ) -> Result<(), MeshWriteError> {
@@ -139,7 +140,11 @@ fn write_array(
     let size = |range: &Range<usize>| (range.len() * column.item_size()) as u64;
     let whole = ranges.first().map_or(0, size);
     let last = ranges.last().map_or(0, size);
-    let mut compressed = Vec::with_capacity(ranges.len());
+    let mut header = vec![ranges.len() as u64, whole, if last == whole { 0 } else { last }];
+    header.resize(header.len() + ranges.len(), 0);
+    let start = out.stream_position()?;
+    Column::slice(&header, Endian::Little).write(out)?;
+    header.truncate(3);
     step(0.0)?;
     for some in ranges.chunks(BLOCKS_PER_STEP) {
         let blocks: io::Result<Vec<_>> = some
@@ -150,15 +155,16 @@ fn write_array(
                 compress(raw)
             })
             .collect();
-        compressed.append(&mut blocks?);
-        step(compressed.len() as f64 / ranges.len() as f64)?;
+        for block in blocks? {
+            out.write_all(&block)?;
+            header.push(block.len() as u64);
+        }
+        step((header.len() - 3) as f64 / ranges.len() as f64)?;
     }
-    let mut header = vec![ranges.len() as u64, whole, if last == whole { 0 } else { last }];
-    header.extend(compressed.iter().map(|b| b.len() as u64));
+    let end = out.stream_position()?;
+    out.seek(SeekFrom::Start(start))?;
     Column::slice(&header, Endian::Little).write(out)?;
-    for block in &compressed {
-        out.write_all(block)?;
-    }
+    out.seek(SeekFrom::Start(end))?;
     Ok(())
 }
 
