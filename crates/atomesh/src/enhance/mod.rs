@@ -18,7 +18,7 @@
 mod quantile;
 mod scale;
 
-use crate::image::{Grid, Image, Samples, Stencil, Units, gaussian, magnitude};
+use crate::image::{Grid, Image, Samples, Stencil, Units, gaussian_between, magnitude};
 use crate::watch::{Cancelled, Phase, Watch, check};
 use quantile::{Order, Ranks};
 use rayon::prelude::*;
@@ -198,29 +198,42 @@ pub fn enhance<const D: usize>(
     check(watch, Phase::Potential, 0.0, None)?;
     let unit = UnitSamples::new(image.samples())?;
     check(watch, Phase::Potential, 0.1, None)?;
-    let sign = if options.repel { -1.0 } else { 1.0 };
-    let mut enhanced = match options.features {
-        Features::None => Enhanced { values: vec![0.0; unit.len()], constant: false },
-        _ if unit.is_constant() => Enhanced { values: vec![0.0; unit.len()], constant: true },
-        Features::Dark => unit.map(&Ramp::dark(&unit), sign),
-        Features::Bright => unit.map(&Ramp::bright(&unit), sign),
+    let zeros = || vec![0.0; unit.len()];
+    let shown = match options.features {
+        Features::None => None,
+        _ if unit.is_constant() => None,
+        Features::Dark => Some((zeros(), Ramp::dark(&unit))),
+        Features::Bright => Some((zeros(), Ramp::bright(&unit))),
         Features::Edges => edges(&unit, image, options, watch)?,
     };
     check(watch, Phase::Potential, 0.8, None)?;
-    let flat = enhanced.constant || options.features == Features::None;
+    let constant = shown.is_none() && options.features != Features::None;
+    let Some((mut values, ramp)) = shown else {
+        return Ok(Enhanced { values: zeros(), constant });
+    };
+    let sign = if options.repel { -1.0 } else { 1.0 };
+    let scale = |start, part: &mut [f32]| {
+        if options.features != Features::Edges {
+            unit.fill(start, part);
+        }
+        ramp.apply(part, sign);
+    };
+    let (least, greatest) = if options.repel { (0.0, 1.0) } else { (-1.0, 0.0) };
+    let clip = |part: &mut [f32]| {
+        for b in part {
+            *b = b.clamp(least, greatest) + 0.0; // rounding may leave the range; no −0
+        }
+    };
     let grid = image.frame().grid(options.units);
     let sigma = options.sigma(&grid);
-    if sigma[0] > 0.0 && !flat {
-        gaussian(&mut enhanced.values, grid.shape, sigma);
-        let (least, greatest) = if options.repel { (0.0, 1.0) } else { (-1.0, 0.0) };
-        enhanced.values.par_chunks_mut(BLOCK).for_each(|block| {
-            for b in block {
-                *b = b.clamp(least, greatest) + 0.0; // rounding may leave the range; no −0
-            }
-        });
+    if sigma[0] > 0.0 {
+        gaussian_between(&mut values, grid.shape, sigma, scale, clip);
+    } else {
+        let parts = values.par_chunks_mut(BLOCK).enumerate();
+        parts.for_each(|(block, part)| scale(block * BLOCK, part));
     }
     check(watch, Phase::Potential, 1.0, None)?;
-    Ok(enhanced)
+    Ok(Enhanced { values, constant })
 }
 
 /// Takes samples as a potential as they are, without rescaling.
@@ -247,13 +260,13 @@ fn check_options(options: &FeatureOptions) -> Result<(), EnhanceError> {
     Ok(())
 }
 
-/// The potential of edges.
+/// The gradients of the image, and what of them is a full feature; `None` if all are 0.
 fn edges<const D: usize>(
     unit: &UnitSamples,
     image: &Image<D>,
     options: &FeatureOptions,
     watch: &mut dyn Watch,
-) -> Result<Enhanced, EnhanceError> {
+) -> Result<Option<(Vec<f32>, Ramp)>, EnhanceError> {
     let stencil = match options.edge_operator {
         EdgeOperator::Prewitt => Stencil::Prewitt,
         EdgeOperator::Gaussian => Stencil::Gaussian(options.edge_scale),
@@ -263,7 +276,7 @@ fn edges<const D: usize>(
     let least = grid.least_step();
     grid.step = grid.step.map(|step| step / least);
     let fill = |start, out: &mut [f32]| unit.fill(start, out);
-    let mut values = magnitude(fill, &grid, stencil, &mut |done| {
+    let values = magnitude(fill, &grid, stencil, &mut |done| {
         check(watch, Phase::Potential, 0.1 + 0.5 * done, None)
     })?;
     let copy = |start: usize, out: &mut [f32]| {
@@ -276,13 +289,7 @@ fn edges<const D: usize>(
     if feature == 0.0 {
         feature = order.ranked(share(0.0)).value;
     }
-    if feature == 0.0 {
-        return Ok(Enhanced { values, constant: true });
-    }
-    let ramp = Ramp { background: 0.0, feature };
-    let sign = if options.repel { -1.0 } else { 1.0 };
-    values.par_chunks_mut(BLOCK).for_each(|block| ramp.apply(block, sign));
-    Ok(Enhanced { values, constant: false })
+    Ok((feature != 0.0).then_some((values, Ramp { background: 0.0, feature })))
 }
 
 #[cfg(test)]

@@ -1,9 +1,8 @@
 //! Scaling of samples: where the background is, and where a full feature.
 
+use super::EnhanceError;
 use super::quantile::{Levels, Order, Ranks};
-use super::{BLOCK, EnhanceError, Enhanced};
 use crate::image::Samples;
-use rayon::prelude::*;
 
 /// Of the samples darker (brighter) than the background, the share that is clipped to −1.
 const CLIPPED_FEATURES: f64 = 0.02;
@@ -99,15 +98,6 @@ impl<'a> UnitSamples<'a> {
             }
             _ => Box::new(Order::new(self.len(), |start, out: &mut [f32]| self.fill(start, out))),
         }
-    }
-
-    pub(super) fn map(&self, ramp: &Ramp, sign: f32) -> Enhanced {
-        let mut values = vec![0.0; self.len()];
-        values.par_chunks_mut(BLOCK).enumerate().for_each(|(block, out)| {
-            self.fill(block * BLOCK, out);
-            ramp.apply(out, sign);
-        });
-        Enhanced { values, constant: false }
     }
 }
 

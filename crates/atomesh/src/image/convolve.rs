@@ -226,30 +226,45 @@ pub(super) fn convolve<const D: usize>(
     shape: [usize; D],
     kernels: &[Option<Kernel>; D],
 ) {
+    convolve_between(values, shape, kernels, |_, _| {}, |_| {});
+}
+
+/// The same where `before(start, part)` may change the samples from index `start` on before they are
+/// convolved, and `after(part)` when they are: while they are at hand, so that large images come from
+/// memory less often.
+pub(super) fn convolve_between<const D: usize>(
+    values: &mut [f32],
+    shape: [usize; D],
+    kernels: &[Option<Kernel>; D],
+    before: impl Fn(usize, &mut [f32]) + Sync,
+    after: impl Fn(&mut [f32]) + Sync,
+) {
     assert_eq!(values.len(), shape.iter().product::<usize>(), "samples for shape {shape:?}");
     if values.is_empty() {
         return;
     }
     let slab: usize = shape[..D - 1].iter().product();
-    if kernels[..D - 1].iter().any(Option::is_some) {
-        let few = BLOCK_SAMPLES.div_ceil(slab); // rows are small work: hand out many at once
-        values.par_chunks_mut(slab).with_min_len(few).for_each_init(Vec::new, |scratch, slab| {
-            convolve_slab(slab, &shape[..D - 1], &kernels[..D - 1], scratch);
-        });
-    }
-    if let Some(kernel) = &kernels[D - 1] {
-        let width = block_width(shape[D - 1], kernel);
-        let mut columns = Columns::new(values, slab, width);
-        loop {
-            // a few thousand lines at a time: the list of lines stays small beside the image
-            let mut batch: Vec<_> = columns.by_ref().take(64).collect();
-            if batch.is_empty() {
-                break;
-            }
-            batch.par_iter_mut().for_each_init(Vec::new, |scratch, lines| {
-                convolve_lines(lines, kernel, scratch);
-            });
+    let few = BLOCK_SAMPLES.div_ceil(slab); // rows are small work: hand out many at once
+    let slabs = values.par_chunks_mut(slab).with_min_len(few).enumerate();
+    slabs.for_each_init(Vec::new, |scratch, (i, slab)| {
+        before(i * slab.len(), slab);
+        convolve_slab(slab, &shape[..D - 1], &kernels[..D - 1], scratch);
+    });
+    let Some(kernel) = &kernels[D - 1] else {
+        return values.par_chunks_mut(BLOCK_SAMPLES).for_each(&after);
+    };
+    let width = block_width(shape[D - 1], kernel);
+    let mut columns = Columns::new(values, slab, width);
+    loop {
+        // a few thousand lines at a time: the list of lines stays small beside the image
+        let mut batch: Vec<_> = columns.by_ref().take(64).collect();
+        if batch.is_empty() {
+            break;
         }
+        batch.par_iter_mut().for_each_init(Vec::new, |scratch, lines| {
+            convolve_lines(lines, kernel, scratch);
+            lines.iter_mut().for_each(|line| after(line));
+        });
     }
 }
 

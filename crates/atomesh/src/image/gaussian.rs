@@ -6,7 +6,7 @@
 //!
 //! Cost: O(σ) per sample and axis.
 
-use super::convolve::{Kernel, convolve};
+use super::convolve::{Kernel, convolve, convolve_between};
 
 /// Where kernels end, in standard deviations.
 const TRUNCATE: f64 = 4.0;
@@ -26,6 +26,18 @@ const TRUNCATE: f64 = 4.0;
 /// ```
 pub fn gaussian<const D: usize>(values: &mut [f32], shape: [usize; D], sigma: [f64; D]) {
     convolve(values, shape, &kernels(shape, sigma, [0; D]));
+}
+
+/// [`gaussian`] where `before(start, part)` makes the samples from index `start` on before they are
+/// smoothed, and `after(part)` may change them when they are: large images come from memory less often.
+pub(crate) fn gaussian_between<const D: usize>(
+    values: &mut [f32],
+    shape: [usize; D],
+    sigma: [f64; D],
+    before: impl Fn(usize, &mut [f32]) + Sync,
+    after: impl Fn(&mut [f32]) + Sync,
+) {
+    convolve_between(values, shape, &kernels(shape, sigma, [0; D]), before, after);
 }
 
 /// The derivative of the smoothed `values`, `order[k]` times along axis k, per sample.

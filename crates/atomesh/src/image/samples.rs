@@ -168,7 +168,7 @@ impl Samples {
     pub fn to_f32(&self) -> Vec<f32> {
         match self {
             Samples::F32(v) => v.clone(),
-            _ => each!(self, v => v.iter().map(|&s| f64::from(s) as f32).collect()),
+            _ => each!(self, v => v.par_iter().map(|&s| f64::from(s) as f32).collect()),
         }
     }
 

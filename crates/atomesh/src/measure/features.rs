@@ -111,7 +111,7 @@ fn deep_samples<const D: usize>(
 ) -> Vec<usize> {
     let mut smooth = potential.to_vec();
     gaussian(&mut smooth, shape, sigma);
-    (0..smooth.len()).filter(|&i| -smooth[i] > LEAST_DEPTH).collect()
+    (0..smooth.len()).into_par_iter().filter(|&i| -smooth[i] > LEAST_DEPTH).collect()
 }
 
 /// First and second derivatives at a sample.

@@ -8,11 +8,16 @@ use super::faces::faces;
 use crate::geometry::linear::solve;
 use crate::geometry::{Bounds, Point, difference, dot};
 use crate::mesh::Mesh;
+use rayon::prelude::*;
 
 /// Facets in a leaf, at most.
 const LEAF: usize = 4;
 
+/// Facets from which on the parts of a tree are made side by side.
+const PARALLEL: usize = 1 << 10;
+
 /// A box and the facets in it: those of its two parts, the first of which follows at once.
+#[derive(Clone)]
 struct Node<const D: usize> {
     bounds: Bounds<D>,
     start: usize,
@@ -42,16 +47,19 @@ impl<'a, const D: usize> FacetTree<'a, D> {
     pub fn new(mesh: &'a Mesh<D>) -> Self {
         let points = mesh.points();
         let mut placed: Vec<Placed<D>> = faces::<D, D>(mesh)
-            .into_iter()
+            .into_par_iter()
             .map(|facet| {
                 let bounds = bounds_of(&facet.map(|c| points[c as usize]));
                 let middle = std::array::from_fn(|k| bounds.min[k] + bounds.max[k]);
                 Placed { facet, middle }
             })
             .collect();
-        let mut nodes = Vec::with_capacity(4 * placed.len() / LEAF + 1);
+        let mut nodes = Vec::new();
         if !placed.is_empty() {
-            build(points, &mut placed, 0, &mut nodes);
+            let empty = Bounds { min: [0.0; D], max: [0.0; D] };
+            let none = Node { bounds: empty, start: 0, end: 0, second: 0 };
+            nodes.resize(node_counts(placed.len()).0, none);
+            build(points, &mut placed, 0, 0, &mut nodes);
         }
         Self { points, facets: placed.into_iter().map(|p| p.facet).collect(), nodes }
     }
@@ -101,12 +109,30 @@ struct Placed<const D: usize> {
     middle: Point<D>,
 }
 
-/// Appends the nodes over `placed`, whose first facet is number `start`; puts the facets in order.
+/// How many nodes a tree over `count` facets has, and one over `count + 1`.
+///
+/// Parts of one depth differ by at most one facet, so that two numbers a depth tell all.
+fn node_counts(count: usize) -> (usize, usize) {
+    if count < LEAF {
+        return (1, 1);
+    }
+    let (half, half_and_one) = node_counts(count / 2);
+    let odd = 1 + half + half_and_one;
+    match count % 2 {
+        _ if count == LEAF => (1, odd),
+        0 => (1 + 2 * half, odd),
+        _ => (odd, 1 + 2 * half_and_one),
+    }
+}
+
+/// Makes the nodes over `placed`, whose first facet is number `start`, in `nodes`, whose first is number
+/// `node`; puts the facets in order.
 fn build<const D: usize>(
     points: &[Point<D>],
     placed: &mut [Placed<D>],
     start: usize,
-    nodes: &mut Vec<Node<D>>,
+    node: usize,
+    nodes: &mut [Node<D>],
 ) {
     let mut bounds = bounds_of(&placed[0].facet.map(|c| points[c as usize]));
     for p in &placed[1..] {
@@ -116,9 +142,9 @@ fn build<const D: usize>(
             bounds.max[k] = bounds.max[k].max(more.max[k]);
         }
     }
-    let node = nodes.len();
-    nodes.push(Node { bounds, start, end: start + placed.len(), second: 0 });
+    let end = start + placed.len();
     if placed.len() <= LEAF {
+        nodes[0] = Node { bounds, start, end, second: 0 };
         return;
     }
     let extent = bounds.extent();
@@ -126,9 +152,19 @@ fn build<const D: usize>(
     let half = placed.len() / 2;
     placed.select_nth_unstable_by(half, |a, b| a.middle[axis].total_cmp(&b.middle[axis]));
     let (first, second) = placed.split_at_mut(half);
-    build(points, first, start, nodes);
-    nodes[node].second = nodes.len();
-    build(points, second, start + half, nodes);
+    let first_count = node_counts(half).0;
+    nodes[0] = Node { bounds, start, end, second: node + 1 + first_count };
+    let (first_nodes, second_nodes) = nodes[1..].split_at_mut(first_count);
+    let parallel = end - start > PARALLEL;
+    let mut build_first = || build(points, first, start, node + 1, first_nodes);
+    let mut build_second =
+        || build(points, second, start + half, node + 1 + first_count, second_nodes);
+    if parallel {
+        rayon::join(build_first, build_second);
+    } else {
+        build_first();
+        build_second();
+    }
 }
 
 /// The box of a facet.

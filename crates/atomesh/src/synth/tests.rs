@@ -70,6 +70,23 @@ fn dark_features_are_where_the_truth_says() {
 }
 
 #[test]
+fn the_grey_of_faults_is_a_gaussian_of_their_distance() {
+    fn holds<const D: usize>(scene: Scene, options: &SynthOptions<D>) {
+        let (values, truth) = made(scene, options);
+        let step = options.spacing.into_iter().fold(0.0, f64::max);
+        for (i, &value) in values.iter().enumerate() {
+            let u = truth.distance(&world(options, i)) / (1.25 * step);
+            // to the last bit, though far faults are passed over
+            let grey = grey::BACKGROUND + (grey::DARK - grey::BACKGROUND) * (-0.5 * u * u).exp();
+            assert_eq!(value, grey as f32, "{scene} {i}");
+        }
+    }
+    holds(Scene::SectionFaults, &SynthOptions { seed: 7, ..SynthOptions::new([96, 80]) });
+    let spacing = [1.0, 2.0, 1.5];
+    holds(Scene::LayersFaults, &SynthOptions { spacing, ..SynthOptions::new([48, 40, 44]) });
+}
+
+#[test]
 fn edges_are_where_the_truth_says() {
     /// |Δ| along x over two samples: large on edges only.
     fn holds<const D: usize>(scene: Scene, options: &SynthOptions<D>) {
