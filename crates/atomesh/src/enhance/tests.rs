@@ -73,6 +73,28 @@ fn the_unit_of_the_samples_does_not_matter() {
 }
 
 #[test]
+fn samples_of_any_type_give_the_same_potential_to_the_last_bit() {
+    let bytes = lines();
+    // counted by value, looked up, or neither: offsets of small whole numbers round nowhere
+    let kinds = [
+        Samples::I8(bytes.iter().map(|&s| (i16::from(s) - 128) as i8).collect()),
+        Samples::U16(bytes.iter().map(|&s| 40_000 + u16::from(s)).collect()),
+        Samples::I16(bytes.iter().map(|&s| i16::from(s) - 300).collect()),
+        Samples::I32(bytes.iter().map(|&s| i32::from(s) - 1000).collect()),
+        Samples::F32(bytes.iter().map(|&s| f32::from(s)).collect()),
+        Samples::F64(bytes.iter().map(|&s| f64::from(s) + 7.0).collect()),
+    ];
+    for features in [Features::Dark, Features::Bright, Features::Edges] {
+        let options = FeatureOptions { features, ..Default::default() };
+        let expected = run(&image([200, 100], Samples::U8(bytes.clone())), options).values;
+        for samples in &kinds {
+            let found = run(&image([200, 100], samples.clone()), options).values;
+            assert!(found == expected, "{features:?} {}", samples.type_name());
+        }
+    }
+}
+
+#[test]
 fn sparse_features_on_a_flat_background_are_found() {
     let mut likelihood = vec![0.0f32; 100 * 100];
     likelihood[5000..5020].fill(0.8);
