@@ -144,3 +144,18 @@ fn crystal(side: usize) -> Result<Scenery, Failure> {
 fn sorted(atoms: &[Point<3>]) -> Vec<Point<3>> {
     hilbert_order(atoms).iter().map(|&i| atoms[i as usize]).collect()
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn an_inner_atom_of_the_crystal_has_eighteen_neighbours_within_the_cut_off() {
+        let atoms = crystal(4).unwrap().atoms;
+        assert_eq!(atoms.len(), 4 * 64);
+        let middle = [2.0 * SQRT_2; 3];
+        let squared = |p: &Point<3>| (0..3).map(|k| (p[k] - middle[k]).powi(2)).sum::<f64>();
+        let near = atoms.iter().filter(|p| squared(p) < 1.5 * 1.5).count();
+        assert_eq!(near, 1 + 18); // itself, 12 at distance 1, 6 at √2
+    }
+}

@@ -31,6 +31,15 @@ pub struct Graded {
     /// d = velocity / rate: frequency times points per wavelength, 1/s.
     #[arg(long)]
     rate: f32,
+    /// Relative decrease of the energy at which atoms stop; the default of atomesh otherwise.
+    #[arg(long)]
+    tolerance: Option<f64>,
+    /// Perturbations; the default of atomesh otherwise.
+    #[arg(long)]
+    outer_limit: Option<usize>,
+    /// How far a perturbation moves an atom; the default of atomesh otherwise.
+    #[arg(long)]
+    perturbation: Option<f64>,
     /// Where the mesh goes.
     #[arg(long)]
     mesh: Option<PathBuf>,
@@ -54,6 +63,16 @@ impl Graded {
         Ok(answer)
     }
 
+    fn options(&self) -> OptimizeOptions {
+        let default = OptimizeOptions::default();
+        OptimizeOptions {
+            tolerance: self.tolerance.unwrap_or(default.tolerance),
+            outer_limit: self.outer_limit.unwrap_or(default.outer_limit),
+            perturbation: self.perturbation.unwrap_or(default.perturbation),
+            ..default
+        }
+    }
+
     fn mesh_of(&self, velocity: &[f32], grid: Grid<2>) -> Result<(Mesh<2>, Value), Failure> {
         let start = Clock::start();
         let field: Vec<f32> = velocity.iter().map(|v| v / self.rate).collect();
@@ -70,7 +89,7 @@ impl Graded {
         let potential = ImagePotential::new(nothing, vec![0.0; 4], Interpolation::Linear)?;
         let weight = ImageWeight::constant(0.0)?;
         let fields = Fields { potential: &potential, weight: &weight, distance: &distance };
-        let lattice = optimize(lattice, fields, &OptimizeOptions::default(), &mut Silent)?;
+        let lattice = optimize(lattice, fields, &self.options(), &mut Silent)?;
         let optimized = start.stop();
         let mesh = Delaunay::<2>::new().connect(lattice.lattice().atoms(), &mut Silent)?;
         let connected = start.stop();

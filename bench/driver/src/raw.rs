@@ -43,3 +43,21 @@ pub fn write_mesh<const D: usize>(path: Option<&Path>, mesh: &Mesh<D>) -> Result
     fs::write(path.with_extension("cells"), cells)?;
     Ok(())
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn points_come_back_from_the_file_of_a_mesh() {
+        let folder = std::env::temp_dir().join(format!("bench-driver-{}", std::process::id()));
+        fs::create_dir_all(&folder).unwrap();
+        let points = vec![[0.0, 0.1], [1.0, -2.5e-300], [0.0, 1.0]];
+        let mesh = Mesh::new(points.clone(), vec![0, 1, 2]).unwrap();
+        write_mesh(Some(&folder.join("mesh")), &mesh).unwrap();
+        assert_eq!(read_points::<2>(&folder.join("mesh.points")).unwrap(), points);
+        assert!(read_points::<4>(&folder.join("mesh.points")).is_err());
+        assert_eq!(fs::read(folder.join("mesh.cells")).unwrap().len(), 12);
+        fs::remove_dir_all(folder).unwrap();
+    }
+}
