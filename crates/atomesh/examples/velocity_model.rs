@@ -54,9 +54,6 @@ fn main() -> Result<(), Box<dyn std::error::Error>> {
 
     let report = shape(&mesh, Some(&grid.bounds()), &mut Silent)?;
     println!("{} vertices, {:.0} a second", report.points, report.points as f64 / seconds);
-    println!(
-        "q mean {:.3}, 1st percentile {:.3}, least {:.3}",
-        report.q_mean, report.q_p1, report.q_min
-    );
+    println!("quality: mean {:.3}, least {:.3}", report.q_mean, report.q_min);
     Ok(())
 }
