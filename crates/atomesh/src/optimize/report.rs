@@ -75,7 +75,8 @@ pub struct OptimizeReport {
 }
 
 impl OptimizeReport {
-    pub(super) fn new(engine: EngineKind) -> Self {
+    /// The report of a lattice that nobody has moved.
+    pub fn new(engine: EngineKind) -> Self {
         Self { engine, evaluations: 0, energy_atomic: 0.0, energy_image: 0.0, stages: Vec::new() }
     }
 

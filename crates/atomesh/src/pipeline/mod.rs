@@ -37,9 +37,9 @@ use crate::distance::{GRADIENT_LIMIT, Grading, NominalDistance, default_distance
 use crate::enhance::{self, FeatureOptions, Features};
 use crate::geometry::{Point, compact_order};
 use crate::image::{Frame, Grid, Image, Units};
-use crate::lattice::{GrowOptions, Lattice, ScatterOptions, grow, scatter};
+use crate::lattice::{GrowOptions, Lattice, ScatterOptions, fill_holes, grow, scatter, settle};
 use crate::mesh::{Mesh, merge_duplicates};
-use crate::optimize::{EngineKind, Fields, optimize};
+use crate::optimize::{EngineKind, Fields, OptimizeReport, optimize};
 use crate::potential::{ImagePotential, ImageWeight, Interpolation};
 use crate::watch::{Phase, Watch, check};
 use rayon::prelude::*;
@@ -210,7 +210,8 @@ impl<const D: usize> Prepared<'_, D> {
             Some(crystal) => {
                 let options =
                     GrowOptions { spacing_factor: self.options.spacing_factor, seed_points: seeds };
-                grow(crystal, bounds, &self.distance, &options, watch)?
+                let lattice = grow(crystal, bounds, &self.distance, &options, watch)?;
+                self.even_out(lattice, watch)?
             }
             None => {
                 let options =
@@ -220,6 +221,28 @@ impl<const D: usize> Prepared<'_, D> {
         };
         let order = compact_order(lattice.atoms());
         Ok(lattice.reordered(&order))
+    }
+
+    /// Fills and settles a crystal that has grown where d varies.
+    fn even_out(
+        &self,
+        lattice: Lattice<D>,
+        watch: &mut dyn Watch,
+    ) -> Result<Lattice<D>, PipelineError> {
+        let (Some(evening), false) = (self.method.evening(), self.distance.is_constant()) else {
+            return Ok(lattice);
+        };
+        let (scatterer, distance) = (self.method.scatterer(), &self.distance);
+        let lattice =
+            fill_holes(scatterer, lattice.along_curve(), distance, evening.rounds, watch)?;
+        Ok(settle(scatterer, lattice.along_curve(), distance, evening.sweeps, watch)?)
+    }
+
+    /// Whether atoms stay as they were grown: nothing pulls them, and they are evened out already.
+    fn stays_as_grown(&self) -> bool {
+        let is_crystal = self.options.lattice != LatticeKind::Random;
+        let is_even = is_crystal && self.method.evening().is_some() && !self.distance.is_constant();
+        is_even && (self.weight.as_constant() == Some(0.0) || self.potential.range() == (0.0, 0.0))
     }
 
     /// Grows the lattice, moves the atoms, connects them.
@@ -235,10 +258,16 @@ impl<const D: usize> Prepared<'_, D> {
             return Err(PipelineError::Memory { needed: estimate.memory, available, least });
         }
         let lattice = self.grow(watch)?;
-        let fields =
-            Fields { potential: &self.potential, weight: &self.weight, distance: &self.distance };
-        let optimized = optimize(lattice, fields, &self.options.optimize, watch)?;
-        let (lattice, report) = optimized.into_parts();
+        let (lattice, report) = if self.stays_as_grown() {
+            (lattice, OptimizeReport::new(self.options.optimize.engine))
+        } else {
+            let fields = Fields {
+                potential: &self.potential,
+                weight: &self.weight,
+                distance: &self.distance,
+            };
+            optimize(lattice, fields, &self.options.optimize, watch)?.into_parts()
+        };
         // where the image alone counts, atoms may fall into the same corner
         let (points, _) = merge_duplicates(lattice.atoms());
         let mesh = self.method.delaunay().connect(&points, watch)?;
