@@ -178,9 +178,10 @@ mod tests {
     fn cells_come_out_in_order_with_corners_renamed() {
         let cells = vec![[5, 2, 3], [0, 4, 1], [3, 2, 4], [1, 0, 2]];
         let expected = [0, 2, 1, 0, 4, 1, 2, 3, 5, 2, 4, 3];
-        assert_eq!(arrange(&[cells.clone()], &[0, 1, 2, 3, 4, 5]), expected);
+        let sources = [cells];
+        assert_eq!(arrange(&sources, &[0, 1, 2, 3, 4, 5]), expected);
         let order = [7, 3, 9, 5, 8, 4];
-        assert_eq!(arrange(&[cells], &order), expected.map(|c| order[c as usize]));
+        assert_eq!(arrange(&sources, &order), expected.map(|c| order[c as usize]));
     }
 
     #[test]

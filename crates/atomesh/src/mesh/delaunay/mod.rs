@@ -2,7 +2,8 @@
 //!
 //! The points are checked, scaled by a power of two, which is exact, and put along a Hilbert curve;
 //! a connector that knows its dimension makes the cells; the cells are put in a canonical order.
-//! Nothing depends on threads, and the cells do not depend on the order of the points either.
+//! Threads share the work, but nothing depends on them, and the cells do not depend on the order of
+//! the points either.
 //!
 //! In 3-D, points on a common sphere, as in every perfect crystal, leave the choice of cells open.
 //! It is made as if each point's lift |x|² were raised by an infinitesimal amount, larger by orders

@@ -382,7 +382,7 @@ fn cells_as_points<const D: usize>(mesh: &Mesh<D>) -> Vec<Vec<Point<D>>> {
     cells
 }
 
-fn shuffle<T>(items: &mut [T], seed: u64) {
+pub(super) fn shuffle<T>(items: &mut [T], seed: u64) {
     let mut random = Pcg64Mcg::seed_from_u64(seed);
     for k in (1..items.len()).rev() {
         items.swap(k, random.random_range(0..=k));

@@ -114,7 +114,7 @@ impl Triangulation {
     /// Whether the circumsphere of the cell holds `p`. That of an infinite cell is the open half
     /// space beyond its facet and, in the facet's plane, the circle around it: the circle that the
     /// plane cuts from the circumsphere of the finite cell behind, perturbed or not.
-    fn conflicts(&self, cell: &Tetrahedron, p: &Point<3>) -> bool {
+    pub(super) fn conflicts(&self, cell: &Tetrahedron, p: &Point<3>) -> bool {
         let at = |k: usize| &self.vertices[cell.corners[k] as usize].at;
         if !cell.is_infinite() {
             return self.predicates.in_sphere([at(0), at(1), at(2), at(3)], p);

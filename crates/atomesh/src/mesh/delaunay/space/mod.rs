@@ -1,10 +1,16 @@
 //! Tetrahedra by incremental insertion (Bowyer 1981, Watson 1981).
 //!
-//! 1. Points come in rounds, each about eight times the one before, along a Hilbert curve within a
+//! 1. Planes divide the points into a part for each thread ([`split`]); parts work alone ([`part`]).
+//! 2. Points come in rounds, each about eight times the one before, along a Hilbert curve within a
 //!    round: a biased randomized insertion order (Amenta, Choi & Rote 2003).
-//! 2. A walk from the last cell made finds the cell that holds the point ([`locate`]).
-//! 3. Cells whose circumsphere holds the point are removed; they are connected ([`cavity`]).
-//! 4. New cells join the point to the facets around the hole ([`fill`]).
+//! 3. A walk from the last cell made finds the cell that holds the point ([`locate`]).
+//! 4. Cells whose circumsphere holds the point are removed; they are connected ([`cavity`]).
+//! 5. New cells join the point to the facets around the hole ([`fill`]).
+//! 6. Cells near other parts are found ([`seam`]), and their vertices inserted into the first part,
+//!    so that final cells of all parts make up the whole ([`join`]).
+//!
+//! Ties are broken by coordinates, so the triangulation of the points is unique: the cells are the
+//! same at any number of parts.
 //!
 //! An *infinite vertex* closes the hull: beyond each hull facet lies an infinite cell, so every
 //! facet has two cells and points outside the hull are no special case. An infinite cell is in
@@ -30,7 +36,6 @@ mod tests;
 
 use super::prepare::Prepared;
 use super::{STRIDE, canonical, rounds};
-use crate::geometry::{Bounds, Point};
 use crate::watch::{Cancelled, Watch};
 use fill::Rim;
 use part::Part;
@@ -63,7 +68,7 @@ pub(super) fn connect_in_parts(
     watch: &mut dyn Watch,
 ) -> Result<Option<Vec<u32>>, Cancelled> {
     let points = &prepared.points;
-    let predicates = predicates(points);
+    let predicates = Predicates::of(points);
     let start = |ranks: &Vec<u32>| Part::new(points, ranks, rounds::order(ranks.len()), predicates);
     let whole = || (0..points.len() as u32).collect::<Vec<u32>>();
     let parts: Option<Vec<Part>> =
@@ -78,19 +83,15 @@ pub(super) fn connect_in_parts(
 /// Inserts the points one by one in the given order: the slow twin of insertion by parts.
 #[cfg(test)]
 pub(super) fn connect_in_order(
-    points: &[Point<3>],
+    points: &[crate::geometry::Point<3>],
     order: Vec<u32>,
     watch: &mut dyn Watch,
 ) -> Result<Option<Vec<u32>>, Cancelled> {
     let ranks: Vec<u32> = (0..points.len() as u32).collect();
-    match Part::new(points, &ranks, order, predicates(points)) {
+    match Part::new(points, &ranks, order, Predicates::of(points)) {
         Some(part) => connect_parts(vec![part], &ranks, watch).map(Some),
         None => Ok(None),
     }
-}
-
-fn predicates(points: &[Point<3>]) -> Predicates {
-    Predicates::new(Bounds::of(points).map_or([0.0; 3], |bounds| bounds.extent()))
 }
 
 fn connect_parts(

@@ -47,7 +47,7 @@ impl Part {
     }
 
     /// Inserts the next points, so many at most.
-    fn insert(&mut self, most: usize) {
+    pub fn insert(&mut self, most: usize) {
         let end = self.order.len().min(self.inserted + most);
         for &vertex in &self.order[self.inserted..end] {
             self.triangulation.insert(vertex);

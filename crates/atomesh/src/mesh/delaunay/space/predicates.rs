@@ -2,12 +2,13 @@
 //!
 //! Two filters come first, both from the error analysis of Shewchuk (1997), whose order of operations
 //! is kept: one bound on the rounding error for the whole box of points, then one for the box of the
-//! points at hand. What passes neither is decided in fixed point or, where that is too coarse, by
-//! adaptive arithmetic.
+//! points at hand. What passes neither is exact where coordinates have few digits, as in a perfect
+//! crystal; else it is decided in fixed point or, where that is too coarse, by adaptive arithmetic.
 
 use super::fixed;
-use crate::geometry::{Point, lexicographic};
+use crate::geometry::{Bounds, Point, lexicographic};
 use robust::{Coord3D, insphere, orient3d};
+use std::cmp::Ordering;
 
 /// Half a unit in the last place of 1.
 const ROUNDING: f64 = f64::EPSILON / 2.0;
@@ -17,11 +18,23 @@ const ROUNDING: f64 = f64::EPSILON / 2.0;
 pub(super) struct Predicates {
     orientation_bound: f64,
     in_sphere_bound: f64,
+    /// Determinants of points no further apart along any axis are exact.
+    exact_reach: f64,
 }
 
+/// Of integers up to this size, the in-sphere determinant of cell and point is exact: it sums up to 72
+/// products of five, which are below 2^53.
+const EXACT_REACH: f64 = 512.0;
+
 impl Predicates {
+    /// For points that lie in a box.
+    pub fn of(points: &[Point<3>]) -> Self {
+        let extent = Bounds::of(points).map_or([0.0; 3], |bounds| bounds.extent());
+        Self { exact_reach: EXACT_REACH * unit_of(points), ..Self::new(extent) }
+    }
+
     /// For points in a box of these lengths.
-    pub fn new(extent: Point<3>) -> Self {
+    fn new(extent: Point<3>) -> Self {
         let volume = extent[0] * extent[1] * extent[2];
         let lift = extent[0] * extent[0] + extent[1] * extent[1] + extent[2] * extent[2];
         // Shewchuk's bounds are (7 + 56ε)ε and (16 + 224ε)ε times the permanent: with every
@@ -29,6 +42,7 @@ impl Predicates {
         Self {
             orientation_bound: 8.0 * ROUNDING * 6.0 * volume,
             in_sphere_bound: 17.0 * ROUNDING * 24.0 * volume * lift,
+            exact_reach: 0.0,
         }
     }
 
@@ -39,7 +53,7 @@ impl Predicates {
         if rounded.abs() > self.orientation_bound {
             return rounded;
         }
-        exact_orientation([a, b, c, d])
+        self.exact_orientation([a, b, c, d])
     }
 
     /// What the rounded in-sphere determinant of a positive cell tells, if it tells.
@@ -52,8 +66,78 @@ impl Predicates {
     #[inline]
     pub fn in_sphere(&self, cell: [&Point<3>; 4], p: &Point<3>) -> bool {
         let rounded = rounded_in_sphere(cell, p);
-        if rounded.abs() > self.in_sphere_bound { rounded > 0.0 } else { exact_in_sphere(cell, p) }
+        if rounded.abs() > self.in_sphere_bound {
+            rounded > 0.0
+        } else {
+            self.exact_in_sphere(cell, p)
+        }
     }
+
+    /// Has the sign of the volume of a, b, c, d.
+    #[cold]
+    fn exact_orientation(&self, corners: [&Point<3>; 4]) -> f64 {
+        let [a, b, c, d] = corners;
+        let rounded = rounded_orientation(corners);
+        let reach = reach([a, b, c], d);
+        if reach.iter().all(|&x| x <= self.exact_reach)
+            || rounded.abs() > Self::new(reach).orientation_bound
+        {
+            return rounded;
+        }
+        exact_orientation(corners)
+    }
+
+    #[cold]
+    fn exact_in_sphere(&self, cell: [&Point<3>; 4], p: &Point<3>) -> bool {
+        let rounded = rounded_in_sphere(cell, p);
+        let reach = reach(cell, p);
+        let sign = if reach.iter().all(|&x| x <= self.exact_reach)
+            || rounded.abs() > Self::new(reach).in_sphere_bound
+        {
+            // Adding 0 turns −0 into 0.
+            (rounded + 0.0).total_cmp(&0.0)
+        } else {
+            exact_in_sphere(cell, p)
+        };
+        if sign.is_eq() { self.perturbed_in_sphere(cell, p) } else { sign.is_gt() }
+    }
+
+    /// Whether `p` is inside the circumsphere of the cell, all five on one sphere, after the lift of each
+    /// point is raised by an infinitesimal amount, larger by orders for lexicographically later points
+    /// (Devillers & Teillaud 2011).
+    ///
+    /// The lifted sphere through the cell is a hyperplane. Raising `p` puts it above, outside. Raising
+    /// corner k raises the hyperplane at `p` by the corner's barycentric weight there, which has the sign
+    /// of the orientation of the cell with `p` in place of the corner. The latest point whose raise
+    /// matters decides; that of `p` does, so the search ends.
+    fn perturbed_in_sphere(&self, cell: [&Point<3>; 4], p: &Point<3>) -> bool {
+        let mut latest_first = [0, 1, 2, 3];
+        latest_first.sort_unstable_by(|&i, &j| lexicographic(cell[j], cell[i]));
+        for corner in latest_first {
+            if lexicographic(p, cell[corner]).is_gt() {
+                return false;
+            }
+            let mut replaced = cell;
+            replaced[corner] = p;
+            let weight = self.exact_orientation(replaced);
+            if weight != 0.0 {
+                return weight > 0.0;
+            }
+        }
+        false
+    }
+}
+
+/// The largest power of two of which all coordinates are multiples, up to 1; 0 if it is below 2^-40.
+fn unit_of(points: &[Point<3>]) -> f64 {
+    const LEAST: f64 = 1.0 / (1_u64 << 40) as f64;
+    let mut unit = 1.0;
+    for x in points.iter().flatten() {
+        while unit >= LEAST && (x / unit).fract() != 0.0 {
+            unit *= 0.5;
+        }
+    }
+    if unit >= LEAST { unit } else { 0.0 }
 }
 
 #[inline(always)]
@@ -101,11 +185,6 @@ fn coordinates(p: &Point<3>) -> Coord3D<f64> {
 /// Has the sign of the volume of a, b, c, d.
 #[cold]
 pub(super) fn exact_orientation(corners: [&Point<3>; 4]) -> f64 {
-    let [a, b, c, d] = corners;
-    let rounded = rounded_orientation(corners);
-    if rounded.abs() > Predicates::new(reach([a, b, c], d)).orientation_bound {
-        return rounded;
-    }
     if let Some(sign) = fixed::orientation(corners) {
         return f64::from(sign as i8);
     }
@@ -113,40 +192,43 @@ pub(super) fn exact_orientation(corners: [&Point<3>; 4]) -> f64 {
     -orient3d(a, b, c, d)
 }
 
-#[cold]
-fn exact_in_sphere(cell: [&Point<3>; 4], p: &Point<3>) -> bool {
-    let rounded = rounded_in_sphere(cell, p);
-    if rounded.abs() > Predicates::new(reach(cell, p)).in_sphere_bound {
-        return rounded > 0.0;
-    }
-    let sign = fixed::in_sphere(cell, p).unwrap_or_else(|| {
+/// The in-sphere determinant of a positive cell and `p` against zero, greater inside.
+fn exact_in_sphere(cell: [&Point<3>; 4], p: &Point<3>) -> Ordering {
+    fixed::in_sphere(cell, p).unwrap_or_else(|| {
         let [a, b, c, d] = cell.map(coordinates);
         0.0_f64.total_cmp(&(insphere(a, b, c, d, coordinates(p)) + 0.0))
-    });
-    if sign.is_eq() { perturbed_in_sphere(cell, p) } else { sign.is_gt() }
+    })
 }
 
-/// Whether `p` is inside the circumsphere of the cell, all five on one sphere, after the lift of each
-/// point is raised by an infinitesimal amount, larger by orders for lexicographically later points
-/// (Devillers & Teillaud 2011).
-///
-/// The lifted sphere through the cell is a hyperplane. Raising `p` puts it above, outside. Raising
-/// corner k raises the hyperplane at `p` by the corner's barycentric weight there, which has the sign
-/// of the orientation of the cell with `p` in place of the corner. The latest point whose raise
-/// matters decides; that of `p` does, so the search ends.
-fn perturbed_in_sphere(cell: [&Point<3>; 4], p: &Point<3>) -> bool {
-    let mut latest_first = [0, 1, 2, 3];
-    latest_first.sort_unstable_by(|&i, &j| lexicographic(cell[j], cell[i]));
-    for corner in latest_first {
-        if lexicographic(p, cell[corner]).is_gt() {
-            return false;
-        }
-        let mut replaced = cell;
-        replaced[corner] = p;
-        let weight = exact_orientation(replaced);
-        if weight != 0.0 {
-            return weight > 0.0;
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::geometry::Simplex;
+    use crate::mesh::delaunay::tests::scatter;
+
+    #[test]
+    fn the_unit_is_the_last_digit_of_all_coordinates() {
+        assert_eq!(unit_of(&[[0.5, -0.75, 0.0], [1.0, 0.25, 0.5]]), 0.25);
+        assert_eq!(unit_of(&[[1.0, 0.0, -1.0]]), 1.0);
+        assert_eq!(unit_of(&[[0.5, 0.1, 0.0]]), 0.0);
+    }
+
+    #[test]
+    fn determinants_of_few_digits_are_exact() {
+        // Integers as far apart as is allowed, and near ones, which are often on one sphere.
+        for side in [EXACT_REACH, 2.0] {
+            let integers = |p: &Point<3>| p.map(|x| (x * side).round());
+            let points: Vec<Point<3>> = scatter::<3>(5000, 1).iter().map(integers).collect();
+            let predicates = Predicates::of(&points);
+            assert_eq!(predicates.exact_reach, EXACT_REACH);
+            for five in points.as_chunks::<5>().0 {
+                let [a, b, c, d, p] = five;
+                let simplex = Simplex { first: *a, others: [*b, *c, *d] };
+                let volume = rounded_orientation([a, b, c, d]);
+                assert_eq!(volume.partial_cmp(&0.0), simplex.orientation().partial_cmp(&0.0));
+                let lifted = rounded_in_sphere([a, b, c, d], p);
+                assert_eq!(lifted.partial_cmp(&0.0), simplex.in_sphere(p).partial_cmp(&0.0));
+            }
         }
     }
-    false
 }

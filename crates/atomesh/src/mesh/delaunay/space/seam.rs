@@ -16,10 +16,7 @@ impl Triangulation {
     /// Finds the cells that points in the boxes may be in conflict with, as a cavity, and their
     /// boundary. The boxes must not meet the box of the vertices.
     pub(super) fn loosen(&mut self, boxes: &[Bounds<3>]) {
-        let seen: Vec<u32> = boxes
-            .iter()
-            .map(|b| self.locate(&std::array::from_fn(|k| 0.5 * b.min[k] + 0.5 * b.max[k])))
-            .collect();
+        let seen: Vec<u32> = boxes.iter().map(|bounds| self.locate(&bounds.min)).collect();
         self.spread(seen, |triangulation, cell| {
             boxes.iter().any(|bounds| triangulation.may_conflict(cell, bounds))
         });

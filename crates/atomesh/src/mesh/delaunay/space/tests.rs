@@ -1,6 +1,7 @@
 //! Parts connected in parallel give the cells of one insertion of all points.
 
 use super::*;
+use crate::geometry::Point;
 use crate::mesh::delaunay::tests::*;
 use crate::mesh::{Delaunay, merge_duplicates};
 use crate::watch::Silent;
@@ -12,6 +13,40 @@ fn assert_parts_change_nothing(points: &[Point<3>], what: &str) {
     let expected = connected(1);
     for parts in [2, 3, 4, 7] {
         assert_eq!(connected(parts), expected, "{what} in {parts} parts");
+    }
+}
+
+/// The cavity and the facets around it, in no order.
+fn found(triangulation: &Triangulation) -> [Vec<u32>; 2] {
+    let mut found = [triangulation.cavity.clone(), triangulation.boundary.clone()];
+    found.iter_mut().for_each(|list| list.sort_unstable());
+    found
+}
+
+#[test]
+fn digging_finds_what_a_plain_search_finds() {
+    for points in [face_centered(4), jittered(&face_centered(4), 0.1), scatter(400, 20)] {
+        let points = scaled(&points, 1.0 / 8.0);
+        let ranks: Vec<u32> = (0..points.len() as u32).collect();
+        let mut order = ranks.clone();
+        shuffle(&mut order, 1);
+        let (first, last) = order.split_at(points.len() / 2);
+        let first = Part::new(&points, &ranks, first.to_vec(), Predicates::of(&points));
+        let mut part = first.unwrap();
+        part.insert(points.len());
+        let triangulation = &mut part.triangulation;
+        for vertex in last.iter().map(|rank| rank + 1) {
+            let p = triangulation.vertices[vertex as usize].at;
+            let holder = triangulation.locate(&p);
+            triangulation.spread([holder], |triangulation, cell| triangulation.conflicts(cell, &p));
+            let expected = found(triangulation);
+            triangulation.tetrahedra.marks.iter_mut().for_each(|mark| {
+                *mark = if *mark == Mark::Free { Mark::Free } else { Mark::Unseen };
+            });
+            triangulation.dig(&p, holder);
+            assert_eq!(found(triangulation), expected, "vertex {vertex}");
+            triangulation.fill(vertex);
+        }
     }
 }
 
