@@ -53,9 +53,24 @@ pub fn gaussian_derivative<const D: usize>(
     sigma: [f64; D],
     order: [u8; D],
 ) -> Vec<f32> {
-    let mut derivative = values.to_vec();
-    convolve(&mut derivative, shape, &kernels(shape, sigma, order));
+    let mut derivative = vec![0.0; values.len()];
+    gaussian_derivative_into(&mut derivative, values, shape, sigma, order);
     derivative
+}
+
+/// [`gaussian_derivative`] written to `out`, of the same length.
+pub(crate) fn gaussian_derivative_into<const D: usize>(
+    out: &mut [f32],
+    values: &[f32],
+    shape: [usize; D],
+    sigma: [f64; D],
+    order: [u8; D],
+) {
+    let copy = |start, part: &mut [f32]| {
+        let end = start + part.len();
+        part.copy_from_slice(&values[start..end]);
+    };
+    convolve_between(out, shape, &kernels(shape, sigma, order), copy, |_| {});
 }
 
 /// The kernels per axis; none where nothing is to be done.

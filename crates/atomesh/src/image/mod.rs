@@ -7,8 +7,8 @@ mod gradient;
 mod samples;
 
 pub use frame::{Frame, FrameError, Grid, Units};
-pub(crate) use gaussian::gaussian_between;
 pub use gaussian::{gaussian, gaussian_derivative};
+pub(crate) use gaussian::{gaussian_between, gaussian_derivative_into};
 pub(crate) use gradient::{Stencil, magnitude};
 pub use gradient::{gradient_magnitude, prewitt_magnitude};
 pub use samples::{Range, Samples};

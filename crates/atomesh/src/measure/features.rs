@@ -14,7 +14,7 @@
 use super::MeasureError;
 use crate::geometry::linear::{Matrix, largest_eigenpair};
 use crate::geometry::{Point, dot};
-use crate::image::{gaussian, gaussian_derivative};
+use crate::image::gaussian_derivative_into;
 use crate::watch::{Phase, Watch, check};
 use rayon::prelude::*;
 
@@ -59,14 +59,15 @@ pub fn features<const D: usize>(
     let derivative_count = (D + D * (D + 1) / 2) as f64;
     check(watch, Phase::Measure, 0.0, None)?;
 
-    let deep = deep_samples(potential, shape, sigma);
+    let mut volume = vec![0.0; potential.len()]; // one derivative after another
+    let deep = deep_samples(potential, shape, sigma, &mut volume);
     let mut slopes = vec![Slopes::default(); deep.len()];
     let mut done = 0.0;
     let mut differentiate = |order: [u8; D], store: &(dyn Fn(&mut Slopes<D>, f32) + Sync)| {
         done += 1.0;
         check(watch, Phase::Measure, done / (derivative_count + 1.0), None)?;
-        let derivative = gaussian_derivative(potential, shape, sigma, order);
-        slopes.par_iter_mut().zip(&deep).for_each(|(s, &index)| store(s, derivative[index]));
+        gaussian_derivative_into(&mut volume, potential, shape, sigma, order);
+        slopes.par_iter_mut().zip(&deep).for_each(|(s, &index)| store(s, volume[index]));
         Ok::<(), MeasureError>(())
     };
     for a in 0..D {
@@ -84,11 +85,13 @@ pub fn features<const D: usize>(
         }
     }
 
+    drop(volume);
     let valleys: Vec<Valley<D>> = slopes
         .par_iter()
         .zip(&deep)
         .filter_map(|(slopes, &index)| slopes.bottom(index, shape))
         .collect();
+    drop((slopes, deep));
     let least = if D == 2 { 4.0 * size } else { 6.0 * size * size };
     let large = in_large_groups(&valleys, shape, least);
     let kept = || valleys.iter().zip(&large).filter(|(_, large)| **large).map(|(v, _)| v);
@@ -108,9 +111,9 @@ fn deep_samples<const D: usize>(
     potential: &[f32],
     shape: [usize; D],
     sigma: [f64; D],
+    smooth: &mut [f32],
 ) -> Vec<usize> {
-    let mut smooth = potential.to_vec();
-    gaussian(&mut smooth, shape, sigma);
+    gaussian_derivative_into(smooth, potential, shape, sigma, [0; D]);
     (0..smooth.len()).into_par_iter().filter(|&i| -smooth[i] > LEAST_DEPTH).collect()
 }
 
