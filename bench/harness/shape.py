@@ -30,23 +30,33 @@ def measure(corners):
     """Signed measure, q, least angle and mean edge of cells given as (n, D + 1, D)."""
     dimension = corners.shape[2]
     edges = corners[:, 1:] - corners[:, :1]
-    size = np.linalg.det(edges) / (2 if dimension == 2 else 6)
+    across = perpendicular(edges)
+    determinant = dot(edges[:, 0], across[:, 0])
     with np.errstate(all="ignore"):
-        # rows of the inverse's transpose are gradients of barycentric coordinates: inward normals / heights
-        flat = size == 0
-        edges = np.where(flat[:, None, None], np.eye(dimension), edges)
-        gradients = np.linalg.inv(edges).transpose(0, 2, 1)
+        # gradients of barycentric coordinates: inward normals over heights
+        gradients = across / determinant[:, None, None]
         gradients = np.concatenate([-gradients.sum(1, keepdims=True), gradients], 1)
-        length = np.linalg.norm(gradients, axis=2)
-        inradius = 1 / length.sum(1)
-        centre = 0.5 * np.einsum("nk,nkd->nd", (edges**2).sum(2), gradients[:, 1:])
-        quality = dimension * inradius / np.linalg.norm(centre, axis=1)
+        length = np.sqrt(dot(gradients, gradients))
+        centre = 0.5 * np.einsum("nk,nkd->nd", dot(edges, edges), gradients[:, 1:])
+        quality = dimension / (length.sum(1) * np.sqrt(dot(centre, centre)))
         normals = gradients / length[..., None]
-    pairs = [(i, j) for i in range(dimension + 1) for j in range(i)]
-    cosines = np.max([-np.einsum("nd,nd->n", normals[:, i], normals[:, j]) for i, j in pairs], 0)
-    angle = np.degrees(np.arccos(np.clip(cosines, -1, 1)))
-    edge = np.mean([np.linalg.norm(corners[:, i] - corners[:, j], axis=1) for i, j in pairs], 0)
-    return size, np.where(flat, 0, np.nan_to_num(quality)), np.where(flat, 0, np.nan_to_num(angle)), edge
+        pairs = [(i, j) for i in range(dimension + 1) for j in range(i)]
+        cosine = np.max([-dot(normals[:, i], normals[:, j]) for i, j in pairs], 0)
+        angle = np.degrees(np.arccos(np.clip(cosine, -1, 1)))
+    edge = sum(np.sqrt(((corners[:, i] - corners[:, j]) ** 2).sum(1)) for i, j in pairs) / len(pairs)
+    return determinant / (2 if dimension == 2 else 6), np.nan_to_num(quality), np.nan_to_num(angle), edge
+
+
+def perpendicular(edges):
+    """For each edge a vector across the others: rows of the adjugate."""
+    if edges.shape[2] == 2:
+        a, b = edges[:, 0], edges[:, 1]
+        return np.stack([np.stack([b[:, 1], -b[:, 0]], 1), np.stack([-a[:, 1], a[:, 0]], 1)], 1)
+    return np.stack([np.cross(edges[:, (k + 1) % 3], edges[:, (k + 2) % 3]) for k in range(3)], 1)
+
+
+def dot(a, b):
+    return np.einsum("...d,...d->...", a, b)
 
 
 def shape(points, cells):
