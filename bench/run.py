@@ -25,19 +25,25 @@ SLOW = 20  # seconds from which on one run of a program has to do
 
 def main():
     options = arguments()
-    installer = Installer(options.retry)
-    build()
-    make_inputs(installer)
-    MESHES.mkdir(exist_ok=True)
     results = json.loads(RESULTS.read_text()) if RESULTS.exists() else {}
-    jobs = {name: SECTIONS[name](Maker(installer, name)) for name in options.only}  # installs all before any runs
-    for name in options.only:
-        results[name] = measure(name, jobs[name], options, installer)
-        RESULTS.write_text(json.dumps(results, indent=1))
+    if not options.table:
+        run(options, results)
     text = table.document({name: results[name] for name in SECTIONS if name in results and name in options.only})
     print(text)
     if options.update:
         table.update(BENCH / "README.md", table.document({name: results[name] for name in SECTIONS if name in results}))
+
+
+def run(options, results):
+    """Measures the sections wanted; each is kept when it is done, so that a run that was ended lost one at most."""
+    installer = Installer(options.retry)
+    build()
+    make_inputs(installer)
+    MESHES.mkdir(exist_ok=True)
+    jobs = {name: SECTIONS[name](Maker(installer, name)) for name in options.only}  # installs all before any runs
+    for name in options.only:
+        results[name] = measure(name, jobs[name], options, installer)
+        RESULTS.write_text(json.dumps(results, indent=1))
 
 
 def arguments():
@@ -45,7 +51,9 @@ def arguments():
     parser.add_argument("--runs", type=int, default=5, help="runs of each program; the tables show medians (default 5)")
     parser.add_argument("--only", type=lambda s: s.split(","), default=list(SECTIONS), metavar="A,B",
                         help=f"sections to run: {', '.join(SECTIONS)} (default all)")
-    parser.add_argument("--update", action="store_true", help="write the tables, with what earlier runs found, into README.md")
+    parser.add_argument("--update", action="store_true",
+                        help="write the tables, with what earlier runs found, into README.md")
+    parser.add_argument("--table", action="store_true", help="run nothing: print what earlier runs found")
     parser.add_argument("--retry", action="store_true", help="try again to install what has failed")
     parser.add_argument("--limit", type=float, default=LIMIT, help=f"seconds that a program may take (default {LIMIT})")
     options = parser.parse_args()
@@ -93,8 +101,9 @@ def measure(name, jobs, options, installer):
     rows = [{"work": job.work, "program": job.program, "threads": job.threads, **table.summary(runs, shape)}
             for job, runs, shape in zip(jobs, taken, shapes)]
     now = datetime.datetime.now(datetime.timezone.utc)
-    conditions = f"{now:%Y-%m-%d %H:%M} UTC, {processor()}, medians of {options.runs} runs, one where it takes more than {SLOW} s; load before it {load:.1f}."
-    return {"rows": rows, "conditions": conditions}
+    conditions = [f"{now:%Y-%m-%d %H:%M} UTC", processor(), f"medians of {options.runs} runs, or one of over {SLOW} s",
+                  f"load before it {load:.1f}"]
+    return {"rows": rows, "conditions": ", ".join(conditions) + "."}
 
 
 def without_mesh(job):

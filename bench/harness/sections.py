@@ -75,9 +75,9 @@ def energy(make):
 
 
 def lammps(make):
-    for lists, ours, name, count in (("in-hand", "in-hand", "lists in hand", 10), ("rebuilt", "rebuilt", "lists rebuilt", 5)):
-        work = f"pair energies and forces, FCC, 10⁶ atoms, {name}"
-        make.driver(work, "atomesh", 1, "energy", "crystal", ours, "--evaluations", count)
+    for lists, words, count in (("in-hand", "lists in hand", 10), ("rebuilt", "lists rebuilt", 5)):
+        work = f"pair energies and forces, FCC, 10⁶ atoms, {words}"
+        make.driver(work, "atomesh", 1, "energy", "crystal", lists, "--evaluations", count)
         for style, skin in (("lj/cut/opt", 0.3), ("lj/cut/opt", 0.5), ("lj/cut", 0.3)):
             make.peer(work, f"LAMMPS {style}, skin {skin} d", 1, "lammps", style, lists, skin, 63, count,
                       script="lammps_pairs")
@@ -127,7 +127,8 @@ def image(make):
     work = f"{'MNI T1' if data else 'synthetic grains'} at d = {EDGE}"
     for threads in (1, 2):
         path = make.mesh(".vtu")
-        command = [ATOMESH, "mesh", scan, "-o", path, "--features", "edges", "--size", EDGE, "--threads", threads, "--quiet"]
+        command = [ATOMESH, "mesh", scan, "-o", path, "--features", "edges", "--size", EDGE, "--threads", threads,
+                   "--quiet"]
         make.ours(work, "atomesh, file to VTU", threads, command, dimension=3, mesh=path)
     about = json.loads((INPUTS / "labels.json").read_text())
     labels = [INPUTS / "labels.u8", *about["shape"], about["spacing"][0]]
@@ -142,9 +143,10 @@ def image(make):
     if data:
         for threads in (1, 2):
             path = make.mesh(".vtu")
-            command = [ATOMESH, "mesh", Path(data) / "hale2001-fig1-faults.png", "-o", path, "--size", 8, "--threads",
-                       threads, "--quiet"]
-            make.ours("Fig. 1 of Hale (2001) at d = 8", "atomesh, file to VTU", threads, command, dimension=2, mesh=path)
+            figure = Path(data) / "hale2001-fig1-faults.png"
+            command = [ATOMESH, "mesh", figure, "-o", path, "--size", 8, "--threads", threads, "--quiet"]
+            make.ours("Fig. 1 of Hale (2001) at d = 8", "atomesh, file to VTU", threads, command, dimension=2,
+                      mesh=path)
     return make.jobs
 
 

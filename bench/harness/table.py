@@ -84,8 +84,11 @@ def ratios(sections):
         if us and them:
             best = max(them, key=lambda row: rate(row, per))
             ratio = rate(us[0], per) / rate(best, per)
-            found.append([words or work, f"{us[0]['program']}, {us[0]['threads']} thread(s)",
-                          f"{best['program']}, {best['threads']} thread(s)", f"{ratio:.2f}"])
+            found.append([words, who(us[0]), who(best), f"{ratio:.2f}"])
+
+    def who(row):
+        quality = f", q mean {row['q_mean']:.3f}" if "q_mean" in row else ""
+        return f"{row['program']}, {row['threads']} thread{'s' if row['threads'] > 1 else ''}{quality}"
 
     def is_ours(threads, lists="atomesh"):
         return lambda row: row["program"].startswith(lists) and row["threads"] == threads
@@ -93,7 +96,7 @@ def ratios(sections):
     cpu, wall = ("cells", "cpu"), ("cells", "wall")
     peers = lambda row: not row["program"].startswith("atomesh")
     for lists in ("atomesh, lists in hand", "atomesh, lists rebuilt"):
-        compare("energy", "energy", is_ours(1, lists), peers, cpu, None)
+        compare("energy", "energy", is_ours(1, lists), peers, cpu, "energy and gradient, atom-evaluations / CPU s")
     for lists in ("lists in hand", "lists rebuilt"):
         compare("lammps", lists, is_ours(1), peers, cpu, f"pairs, {lists}, atom-evaluations / CPU s, best LAMMPS")
     for dimension in (3, 2):
