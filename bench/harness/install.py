@@ -139,7 +139,7 @@ def call(command, what, environment=None):
     done = subprocess.run([str(c) for c in command], capture_output=True, text=True, stdin=subprocess.DEVNULL,
                           env={**os.environ, **(environment or {})})
     if done.returncode:
-        lines = [line.strip() for line in done.stderr.splitlines() if "rror" in line]
+        lines = [line.strip() for line in done.stderr.splitlines() if "error" in line.lower()]
         missing(f"{what}: {lines[0][:100] if lines else f'exit code {done.returncode}'}")
 
 
