@@ -41,12 +41,12 @@ def line(cells):
 
 def energy_cells(row):
     each = row["cpu"] / row["evaluations"]
-    return [named(row), row["threads"], f"{row['atoms']:,}", count(row["atoms"] / each), f"{each:.4f}", megabytes(row)]
+    return [named(row), row["threads"], f"{row['atoms']:,.0f}", count(row["atoms"] / each), f"{each:.4f}", megabytes(row)]
 
 
 def mesh_cells(row):
     q = [f"{row[key]:.3f}" for key in ("q_mean", "q_p1")]
-    return [named(row), row["threads"], f"{row['points']:,}", f"{row['cells']:,}", count(row["cells"] / row["cpu"]),
+    return [named(row), row["threads"], f"{row['points']:,.0f}", f"{row['cells']:,.0f}", count(row["cells"] / row["cpu"]),
             count(row["cells"] / row["wall"]), *q, f"{row['angle_min']:.2g}°", f"{row['edge_mean']:.3g}",
             megabytes(row), f"{row['cpu']:.3g}", f"{row['wall']:.3g}"]
 
