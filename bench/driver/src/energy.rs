@@ -3,7 +3,7 @@
 use std::f64::consts::SQRT_2;
 
 use atomesh::distance::NominalDistance;
-use atomesh::geometry::{Point, hilbert_order};
+use atomesh::geometry::{Point, compact_order};
 use atomesh::image::Grid;
 use atomesh::lattice::{Crystal, GrowOptions, grow};
 use atomesh::potential::{
@@ -58,7 +58,7 @@ struct Scenery {
     potential: ImagePotential<3>,
     weight: ImageWeight<3>,
     distance: NominalDistance<3>,
-    /// Along a Hilbert curve, as the pipeline orders them.
+    /// In a compact order, as the pipeline has them.
     atoms: Vec<Point<3>>,
 }
 
@@ -142,7 +142,7 @@ fn crystal(side: usize) -> Result<Scenery, Failure> {
 }
 
 fn sorted(atoms: &[Point<3>]) -> Vec<Point<3>> {
-    hilbert_order(atoms).iter().map(|&i| atoms[i as usize]).collect()
+    compact_order(atoms).iter().map(|&i| atoms[i as usize]).collect()
 }
 
 #[cfg(test)]

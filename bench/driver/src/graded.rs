@@ -3,12 +3,9 @@
 use std::path::PathBuf;
 
 use atomesh::distance::{GRADIENT_LIMIT, NominalDistance};
-use atomesh::geometry::Point;
 use atomesh::image::Grid;
-use atomesh::lattice::{Crystal, GrowOptions, grow};
+use atomesh::lattice::{Crystal, GrowOptions, Scatterer, fill_holes, grow, settle};
 use atomesh::mesh::{Delaunay, Mesh};
-use atomesh::optimize::{Fields, OptimizeOptions, optimize};
-use atomesh::potential::{ImagePotential, ImageWeight, Interpolation};
 use atomesh::watch::Silent;
 use clap::Args;
 use serde_json::Value;
@@ -31,15 +28,6 @@ pub struct Graded {
     /// d = velocity / rate: frequency times points per wavelength, 1/s.
     #[arg(long)]
     rate: f32,
-    /// Relative decrease of the energy at which atoms stop; the default of atomesh otherwise.
-    #[arg(long)]
-    tolerance: Option<f64>,
-    /// Perturbations; the default of atomesh otherwise.
-    #[arg(long)]
-    outer_limit: Option<usize>,
-    /// How far a perturbation moves an atom; the default of atomesh otherwise.
-    #[arg(long)]
-    perturbation: Option<f64>,
     /// Where the mesh goes.
     #[arg(long)]
     mesh: Option<PathBuf>,
@@ -63,16 +51,6 @@ impl Graded {
         Ok(answer)
     }
 
-    fn options(&self) -> OptimizeOptions {
-        let default = OptimizeOptions::default();
-        OptimizeOptions {
-            tolerance: self.tolerance.unwrap_or(default.tolerance),
-            outer_limit: self.outer_limit.unwrap_or(default.outer_limit),
-            perturbation: self.perturbation.unwrap_or(default.perturbation),
-            ..default
-        }
-    }
-
     fn mesh_of(&self, velocity: &[f32], grid: Grid<2>) -> Result<(Mesh<2>, Value), Failure> {
         let start = Clock::start();
         let field: Vec<f32> = velocity.iter().map(|v| v / self.rate).collect();
@@ -81,19 +59,17 @@ impl Graded {
         let limited = start.stop();
         let bounds = grid.bounds();
         let crystal = Crystal::hexagonal();
-        let lattice = grow(&crystal, bounds, &distance, &GrowOptions::default(), &mut Silent)?;
+        let lattice =
+            grow(&crystal, bounds, &distance, &GrowOptions::default(), &mut Silent)?.along_curve();
         let grown = start.stop();
-        // no image: two samples along each axis say so
-        let extent: Point<2> = bounds.max;
-        let nothing = Grid { shape: [2; 2], step: extent };
-        let potential = ImagePotential::new(nothing, vec![0.0; 4], Interpolation::Linear)?;
-        let weight = ImageWeight::constant(0.0)?;
-        let fields = Fields { potential: &potential, weight: &weight, distance: &distance };
-        let lattice = optimize(lattice, fields, &self.options(), &mut Silent)?;
-        let optimized = start.stop();
-        let mesh = Delaunay::<2>::new().connect(lattice.lattice().atoms(), &mut Silent)?;
+        // as the pipeline does where d varies and nothing pulls
+        let scatterer = Scatterer::<2>::new();
+        let lattice = fill_holes(&scatterer, lattice, &distance, 2, &mut Silent)?.along_curve();
+        let lattice = settle(&scatterer, lattice, &distance, 3, &mut Silent)?;
+        let settled = start.stop();
+        let mesh = Delaunay::<2>::new().connect(lattice.atoms(), &mut Silent)?;
         let connected = start.stop();
-        let phases = [limited, grown, optimized, connected].map(|clock| clock["wall"].clone());
+        let phases = [limited, grown, settled, connected].map(|clock| clock["wall"].clone());
         Ok((mesh, phases.to_vec().into()))
     }
 }

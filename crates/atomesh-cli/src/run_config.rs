@@ -120,7 +120,7 @@ section! {
         /// Iterations that lower the energy, at most, after each perturbation. Default: 200
         #[arg(long, value_name = "COUNT", value_parser = clap::value_parser!(u64).range(1..=1_000_000))]
         pub inner_limit: u64,
-        /// Perturbations, at most. Default: 2
+        /// Perturbations, at most. Default: 2 in 2-D, 1 in 3-D
         #[arg(long, value_name = "COUNT", value_parser = clap::value_parser!(u64).range(0..=1_000_000))]
         pub outer_limit: u64,
         /// How far a perturbation moves an atom, over its edge length, below 0.5. Default: 0.1

@@ -1,4 +1,4 @@
-//! Connecting points in 3-D and 2-D; `bench/cgal-delaunay` gives CGAL the same points in 3-D.
+//! Connecting points in 3-D and 2-D; `bench/run.py` gives CGAL the same points in 3-D.
 
 use atomesh::geometry::Point;
 use atomesh::mesh::Delaunay;

@@ -352,7 +352,7 @@ fn summary<const D: usize>(
 }
 
 /// Seconds that an atom takes from growth to mesh, for the dimension; a guide, from our own runs.
-const SECONDS_PER_ATOM: [f64; 2] = [6e-5, 5e-5];
+const SECONDS_PER_ATOM: [f64; 2] = [2e-5, 1.2e-5];
 
 fn expectation<const D: usize>(prepared: &Prepared<'_, D>, dimension: &Dimension<D>) -> String {
     let estimate = prepared.estimate();

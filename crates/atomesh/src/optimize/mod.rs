@@ -99,12 +99,14 @@ impl OptimizeOptions {
     /// In 2-D the hexagonal lattice is a stable minimum of the pair potential, and the longer atoms
     /// search, from a smoothed image to the sharp one, the better the mesh: fault images gain a tenth
     /// to two fifths in alignment at nearly equal shape. In 3-D no lattice of that density is: a long search
-    /// lets it fall into disorder, with more alignment but flat cells, so it stops early.
+    /// lets it fall into disorder, with more alignment but flat cells, so it stops early, after one
+    /// perturbation: on a brain at d = 6 a second one took a third more evaluations, for recall
+    /// 0.638 against 0.635 and mean quality 0.870 against 0.873.
     pub fn for_dimension(dimension: usize) -> Self {
         if dimension == 2 {
             Self { smoothing_steps: 2, ..Self::default() }
         } else {
-            Self::default()
+            Self { outer_limit: 1, ..Self::default() }
         }
     }
 
