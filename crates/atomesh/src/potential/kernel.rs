@@ -4,7 +4,7 @@ use crate::geometry::Point;
 use crate::pair;
 
 use super::lanes::{Lanes, WIDTH};
-use super::neighbors::Chunk;
+use super::neighbors::List;
 
 /// Below any squared distance of two atoms that are not at one place.
 const TINY: f64 = 1e-300;
@@ -55,20 +55,20 @@ impl Scale for Graded<'_> {
     }
 }
 
-/// ∂A/∂x of the atoms of one chunk, added to `slopes`; returns their energy, a pair's half to either.
+/// ∂A/∂x of some atoms of a chunk, added to `slopes`; returns their energy, a pair's half to either.
 ///
-/// `members` are the chunk's atoms, in the order of its lists.
+/// `lists` are those of the `members`, in the chunk's `neighbors`.
 #[inline(always)]
 pub(super) fn add_pairs<L: Lanes, S: Scale, const D: usize>(
     atoms: &[Point<D>],
     members: &[u32],
-    chunk: &Chunk,
+    (lists, neighbors): (&[List], &[u32]),
     scale: &S,
     slopes: &mut [Point<D>],
 ) -> f64 {
     let mut energy = 0.0;
-    for ((slope, &i), list) in slopes.iter_mut().zip(members).zip(&chunk.lists) {
-        let others = chunk.neighbors[list.start as usize..][..list.padded()].as_chunks().0;
+    for ((slope, &i), list) in slopes.iter_mut().zip(members).zip(lists) {
+        let others = neighbors[list.start as usize..][..list.padded()].as_chunks().0;
         let (pairs, pull) = sum::<L, S, D>(atoms, i as usize, others, list.surplus(), scale);
         energy += 0.5 * pairs;
         (0..D).for_each(|k| slope[k] += pull[k]);
@@ -86,33 +86,49 @@ fn sum<L: Lanes, S: Scale, const D: usize>(
     surplus: usize,
     scale: &S,
 ) -> (f64, Point<D>) {
-    let at: [L::Wide; D] = std::array::from_fn(|k| L::splat(atoms[i][k]));
-    let mut energy = L::splat(0.0);
-    let mut pull = [L::splat(0.0); D];
-    let last = others.len().wrapping_sub(1);
-    for (block, others) in others.iter().enumerate() {
-        let cutoff = L::wide(CUTOFFS[if block == last { surplus } else { 0 }]);
-        // SAFETY: lists hold indices of atoms.
-        let (columns, (inverse_squared, weight)) =
-            unsafe { (L::columns(atoms, others), scale.of::<L>(i, others)) };
-        let v: [L::Wide; D] = std::array::from_fn(|k| L::sub(columns[k], at[k]));
-        let mut r_squared = L::mul(v[0], v[0]);
-        for v in &v[1..] {
-            r_squared = L::add(r_squared, L::mul(*v, *v));
+    let mut sums = [L::splat(0.0); WIDTH];
+    if let Some((last, whole)) = others.split_last() {
+        let at = atoms[i].map(L::splat);
+        let all = L::splat(pair::CUTOFF);
+        for others in whole {
+            add_block::<L, S, D>(atoms, (i, &at), others, all, scale, &mut sums);
         }
-        let u_squared = L::mul(r_squared, inverse_squared);
-        let u = L::sqrt(u_squared);
-        let phi = energy_inside::<L>(u, u_squared);
-        energy = L::add(energy, L::where_less(u, cutoff, L::mul(weight, phi)));
-        // two atoms at one place push nowhere: v is 0
-        let scale = L::div(L::mul(weight, inverse_squared), L::max(u_squared, L::splat(TINY)));
-        let force = L::mul(u, force_inside::<L>(u, u_squared));
-        let slope = L::where_less(u, cutoff, L::mul(scale, force));
-        for k in 0..D {
-            pull[k] = L::add(pull[k], L::mul(slope, v[k]));
-        }
+        let some = L::wide(CUTOFFS[surplus]);
+        add_block::<L, S, D>(atoms, (i, &at), last, some, scale, &mut sums);
     }
-    (total::<L>(energy), pull.map(|lanes| total::<L>(lanes)))
+    let [energy, pull @ ..] = L::totals(sums);
+    (energy, std::array::from_fn(|k| pull[k]))
+}
+
+/// Adds the energy of the pairs of atom i with some others, and its gradient, to `sums`.
+#[inline(always)]
+fn add_block<L: Lanes, S: Scale, const D: usize>(
+    atoms: &[Point<D>],
+    (i, at): (usize, &[L::Wide; D]),
+    others: &[u32; WIDTH],
+    cutoff: L::Wide,
+    scale: &S,
+    sums: &mut [L::Wide; WIDTH],
+) {
+    // SAFETY: lists hold indices of atoms.
+    let (columns, (inverse_squared, weight)) =
+        unsafe { (L::columns(atoms, others), scale.of::<L>(i, others)) };
+    let v: [L::Wide; D] = std::array::from_fn(|k| L::sub(columns[k], at[k]));
+    let mut r_squared = L::mul(v[0], v[0]);
+    for v in &v[1..] {
+        r_squared = L::add(r_squared, L::mul(*v, *v));
+    }
+    let u_squared = L::mul(r_squared, inverse_squared);
+    let u = L::sqrt(u_squared);
+    let phi = energy_inside::<L>(u, u_squared);
+    sums[0] = L::add(sums[0], L::where_less(u, cutoff, L::mul(weight, phi)));
+    // two atoms at one place push nowhere: v is 0
+    let scale = L::div(L::mul(weight, inverse_squared), L::max(u_squared, L::splat(TINY)));
+    let force = L::mul(u, force_inside::<L>(u, u_squared));
+    let slope = L::where_less(u, cutoff, L::mul(scale, force));
+    for k in 0..D {
+        sums[1 + k] = L::add(sums[1 + k], L::mul(slope, v[k]));
+    }
 }
 
 /// The cut-off where none, one … of the last lanes do not count.
@@ -145,13 +161,6 @@ fn force_inside<L: Lanes>(u: L::Wide, u_squared: L::Wide) -> L::Wide {
     let c = L::splat;
     let inner = L::sub(L::mul(c(5.0 / 4.0), u), c(19.0 / 8.0));
     L::add(c(9.0 / 8.0), L::mul(u_squared, inner))
-}
-
-/// The sum of the lanes, in a fixed order.
-#[inline(always)]
-fn total<L: Lanes>(lanes: L::Wide) -> f64 {
-    let [a, b, c, d] = L::lanes(lanes);
-    (a + c) + (b + d)
 }
 
 #[cfg(test)]

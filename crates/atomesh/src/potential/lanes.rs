@@ -18,7 +18,10 @@ pub(super) trait Lanes: Copy {
     fn splat(x: f64) -> Self::Wide;
     /// These numbers.
     fn wide(lanes: [f64; WIDTH]) -> Self::Wide;
+    /// The sum of the lanes of each: (a₀ + a₁) + (a₂ + a₃).
+    fn totals(all: [Self::Wide; WIDTH]) -> [f64; WIDTH];
     /// The numbers.
+    #[cfg(test)]
     fn lanes(a: Self::Wide) -> [f64; WIDTH];
     /// a + b
     fn add(a: Self::Wide, b: Self::Wide) -> Self::Wide;
@@ -72,6 +75,10 @@ impl Lanes for Plain {
     fn wide(lanes: [f64; WIDTH]) -> Self::Wide {
         lanes
     }
+    fn totals(all: [Self::Wide; WIDTH]) -> [f64; WIDTH] {
+        all.map(|[a, b, c, d]| (a + b) + (c + d))
+    }
+    #[cfg(test)]
     fn lanes(a: Self::Wide) -> [f64; WIDTH] {
         a
     }
@@ -169,6 +176,18 @@ mod avx2 {
             unsafe { transmute(lanes) }
         }
         #[inline(always)]
+        fn totals([a, b, c, d]: [__m256d; WIDTH]) -> [f64; WIDTH] {
+            unsafe {
+                // a₀ + a₁, b₀ + b₁, a₂ + a₃, b₂ + b₃
+                let ab = _mm256_add_pd(_mm256_unpacklo_pd(a, b), _mm256_unpackhi_pd(a, b));
+                let cd = _mm256_add_pd(_mm256_unpacklo_pd(c, d), _mm256_unpackhi_pd(c, d));
+                let low = _mm256_permute2f128_pd::<0x20>(ab, cd);
+                let high = _mm256_permute2f128_pd::<0x31>(ab, cd);
+                transmute(_mm256_add_pd(low, high))
+            }
+        }
+        #[cfg(test)]
+        #[inline(always)]
         fn lanes(a: __m256d) -> [f64; WIDTH] {
             unsafe { transmute(a) }
         }
@@ -242,6 +261,17 @@ mod avx2 {
     }
 }
 
+/// Whether functions compiled for AVX-512 too may be used: twice the registers, so that constants stay in
+/// them. The lanes are those of [`Avx2`].
+#[cfg(target_arch = "x86_64")]
+pub(super) fn has_avx512() -> bool {
+    let more = std::arch::is_x86_feature_detected!("avx512f")
+        && std::arch::is_x86_feature_detected!("avx512vl")
+        && std::arch::is_x86_feature_detected!("avx512dq")
+        && std::arch::is_x86_feature_detected!("avx512bw");
+    has_avx2() && more
+}
+
 /// Whether [`Avx2`] may be used.
 #[cfg(target_arch = "x86_64")]
 pub(super) fn has_avx2() -> bool {
@@ -278,6 +308,7 @@ mod tests {
                 L::where_less(a, L::splat(0.5), b),
                 L::wide([0.0, 1.5, -2.0, 1e300]),
                 f,
+                L::wide(L::totals([a, d, e, f])),
             ];
             // which of many NaNs comes out is nobody's concern
             let bits = |x: f64| if x.is_nan() { u64::MAX } else { x.to_bits() };

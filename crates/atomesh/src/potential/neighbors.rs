@@ -68,18 +68,24 @@ impl<const D: usize> Default for Found<D> {
 
 impl NeighborLists {
     /// Lists, for every atom of the tree, those closer than the sum of both half reaches; `order` gives the
-    /// atom at each place of the tree.
-    pub fn build<const D: usize>(&mut self, tree: &Tree<D>, order: &[u32]) {
-        self.chunks.resize_with(order.len().div_ceil(CHUNK), Chunk::default);
+    /// atom at each place of the tree, and `is_own` says that this is the place's own number.
+    pub fn build<const D: usize>(&mut self, tree: &Tree<D>, order: &[u32], is_own: bool) {
+        let order = (order, is_own);
+        self.chunks.resize_with(order.0.len().div_ceil(CHUNK), Chunk::default);
         #[cfg(target_arch = "x86_64")]
-        let wide = super::lanes::has_avx2();
+        let (wide, more) = (super::lanes::has_avx2(), super::lanes::has_avx512());
         self.chunks.par_iter_mut().enumerate().for_each_init(
             Found::default,
             |found, (c, chunk)| {
+                // SAFETY: the processor has been asked whether it has these instructions.
                 #[cfg(target_arch = "x86_64")]
-                if wide {
-                    // SAFETY: the processor has been asked whether it has these instructions.
-                    return unsafe { list_chunk_avx2(tree, order, c, chunk, found) };
+                unsafe {
+                    if more {
+                        return list_chunk_avx512(tree, order, c, chunk, found);
+                    }
+                    if wide {
+                        return list_chunk_avx2(tree, order, c, chunk, found);
+                    }
                 }
                 list_chunk::<Plain, D>(tree, order, c, chunk, found);
             },
@@ -91,7 +97,19 @@ impl NeighborLists {
 #[target_feature(enable = "avx2,popcnt")]
 fn list_chunk_avx2<const D: usize>(
     tree: &Tree<D>,
-    order: &[u32],
+    order: (&[u32], bool),
+    c: usize,
+    chunk: &mut Chunk,
+    found: &mut Found<D>,
+) {
+    list_chunk::<super::lanes::Avx2, D>(tree, order, c, chunk, found);
+}
+
+#[cfg(target_arch = "x86_64")]
+#[target_feature(enable = "avx2,popcnt,avx512f,avx512vl,avx512dq,avx512bw")]
+fn list_chunk_avx512<const D: usize>(
+    tree: &Tree<D>,
+    order: (&[u32], bool),
     c: usize,
     chunk: &mut Chunk,
     found: &mut Found<D>,
@@ -102,11 +120,12 @@ fn list_chunk_avx2<const D: usize>(
 #[inline(always)]
 fn list_chunk<L: Lanes, const D: usize>(
     tree: &Tree<D>,
-    order: &[u32],
+    order: (&[u32], bool),
     c: usize,
     chunk: &mut Chunk,
     found: &mut Found<D>,
 ) {
+    let (order, is_own) = order;
     let Found { wide: [wide, next], groups, blocks, close } = found;
     chunk.lists.clear();
     let mut end = 0;
@@ -145,7 +164,9 @@ fn list_chunk<L: Lanes, const D: usize>(
                 let list = List { start: start as u32, count: (end - start) as u32 };
                 chunk.lists.push(list);
                 let found = &mut chunk.neighbors[start..end + WIDTH];
-                found[..end - start].iter_mut().for_each(|j| *j = order[*j as usize]);
+                if !is_own {
+                    found[..end - start].iter_mut().for_each(|j| *j = order[*j as usize]);
+                }
                 found[end - start..].fill(atom);
                 end = start + list.padded();
             }
@@ -208,7 +229,7 @@ mod tests {
             (scaling.place(&atoms[i]), scaling.half(range[i]))
         });
         let mut lists = NeighborLists::default();
-        lists.build(&tree, &order);
+        lists.build(&tree, &order, false);
         let mut out = vec![Vec::new(); atoms.len()];
         for (c, chunk) in lists.chunks.iter().enumerate() {
             for (a, list) in chunk.lists.iter().enumerate() {
@@ -289,10 +310,10 @@ mod tests {
         tree.build(atoms.len(), |s| (scaling.place(&atoms[s]), scaling.half(1.0)));
         let order: Vec<u32> = (0..atoms.len() as u32).rev().collect();
         let mut lists = NeighborLists::default();
-        lists.build(&tree, &order);
+        lists.build(&tree, &order, false);
         for (c, chunk) in lists.chunks.iter().enumerate() {
             let (mut plain, mut found) = (Chunk::default(), Found::default());
-            list_chunk::<Plain, 3>(&tree, &order, c, &mut plain, &mut found);
+            list_chunk::<Plain, 3>(&tree, (&order, false), c, &mut plain, &mut found);
             assert_eq!(plain.lists, chunk.lists);
             let last = plain.lists[plain.lists.len() - 1];
             let end = last.start as usize + last.padded();

@@ -17,9 +17,9 @@ use crate::pair;
 
 use super::engine::{Energy, Engine, ImageWeight};
 use super::image::ImagePotential;
-use super::kernel::{Graded, Uniform, add_pairs};
+use super::kernel::{Graded, Scale, Uniform, add_pairs};
 use super::lanes::{LANES, Lanes, Plain};
-use super::neighbors::{CHUNK, NeighborLists};
+use super::neighbors::{CHUNK, Chunk, NeighborLists};
 use super::tree::{Scaling, Tree};
 
 /// How far lists reach beyond the cut-off, in nominal distances, or farther if atoms are to move farther.
@@ -30,7 +30,7 @@ const STALE: f64 = 0.25;
 /// eight atoms they may be for the caller's order to be taken.
 const LOOSE: f64 = 1.5;
 
-/// How many atoms ahead samples are asked for.
+/// How many atoms are reckoned with while the samples of as many are on their way.
 const AHEAD: usize = 8;
 
 /// The engine that sums over pairs of near atoms, with an analytic gradient.
@@ -133,7 +133,7 @@ impl<'a, const D: usize> PairsEngine<'a, D> {
             self.build_tree(atoms);
             self.girth = self.tree.girth();
         }
-        self.lists.build(&self.tree, &self.order);
+        self.lists.build(&self.tree, &self.order, self.place.is_empty());
         self.listed.clear();
         self.listed.extend_from_slice(atoms);
     }
@@ -168,22 +168,52 @@ impl<'a, const D: usize> PairsEngine<'a, D> {
     /// Energy and gradient of one chunk of atoms, each gathering over its own list.
     #[inline(always)]
     fn gather<L: Lanes>(&self, atoms: &[Point<D>], c: usize, slopes: &mut [Point<D>]) -> Energy {
-        let members = &self.order[c * CHUNK..][..slopes.len()];
-        let image = self.image_part(atoms, members, slopes);
-        let chunk = &self.lists.chunks[c];
-        let atomic = match (self.distance.is_constant(), self.weight.as_constant()) {
+        match (self.distance.is_constant(), self.weight.as_constant()) {
             (true, Some(beta)) => {
                 let inverse_squared = self.distance.least().powi(-2);
                 let scale = Uniform { inverse_squared, weight: 1.0 - beta };
-                add_pairs::<L, _, D>(atoms, members, chunk, &scale, slopes)
+                self.gather_with::<L, _>(atoms, c, &scale, slopes)
             }
             (_, beta) => {
                 let (distances, weights) = (&self.distances[..], &self.weights[..]);
                 let scale = Graded { distances, weight: 1.0 - beta.unwrap_or(0.0), weights };
-                add_pairs::<L, _, D>(atoms, members, chunk, &scale, slopes)
+                self.gather_with::<L, _>(atoms, c, &scale, slopes)
+            }
+        }
+    }
+
+    /// The same, a few atoms at a time: while their pairs are summed, memory brings the next ones' samples.
+    #[inline(always)]
+    fn gather_with<L: Lanes, S: Scale>(
+        &self,
+        atoms: &[Point<D>],
+        c: usize,
+        scale: &S,
+        slopes: &mut [Point<D>],
+    ) -> Energy {
+        let members = &self.order[c * CHUNK..][..slopes.len()];
+        let Chunk { lists, neighbors } = &self.lists.chunks[c];
+        let has_image = self.weight.as_constant() != Some(0.0);
+        let ask = |some: &[u32]| {
+            if has_image {
+                some.iter().for_each(|&i| self.potential.prefetch(&atoms[i as usize]));
             }
         };
-        Energy { atomic, image }
+        ask(&members[..AHEAD.min(members.len())]);
+        let mut energy = Energy::default();
+        for (few, slopes) in slopes.chunks_mut(AHEAD).enumerate() {
+            let (first, end) = (few * AHEAD, few * AHEAD + slopes.len());
+            ask(&members[end..(end + AHEAD).min(members.len())]);
+            let these = &members[first..end];
+            if has_image {
+                energy.image += self.image_part(atoms, these, slopes);
+            } else {
+                slopes.fill([0.0; D]);
+            }
+            let lists = (&lists[first..end], &neighbors[..]);
+            energy.atomic += add_pairs::<L, _, D>(atoms, these, lists, scale, slopes);
+        }
+        energy
     }
 
     /// The same with wider registers. The operations are the same, in the same order, each rounded once,
@@ -194,19 +224,18 @@ impl<'a, const D: usize> PairsEngine<'a, D> {
         self.gather::<super::lanes::Avx2>(atoms, c, slopes)
     }
 
-    /// The image's part of a chunk: β b, and the gradient. In a loop of its own, so that samples of
-    /// several atoms are on their way at once.
+    /// The same with more registers.
+    #[cfg(target_arch = "x86_64")]
+    #[target_feature(enable = "avx2,popcnt,avx512f,avx512vl,avx512dq,avx512bw")]
+    fn gather_avx512(&self, atoms: &[Point<D>], c: usize, slopes: &mut [Point<D>]) -> Energy {
+        self.gather::<super::lanes::Avx2>(atoms, c, slopes)
+    }
+
+    /// The image's part of some atoms: β b, and the gradient.
     #[inline(always)]
     fn image_part(&self, atoms: &[Point<D>], members: &[u32], slopes: &mut [Point<D>]) -> f64 {
-        if self.weight.as_constant() == Some(0.0) {
-            slopes.fill([0.0; D]);
-            return 0.0;
-        }
         let mut energy = 0.0;
-        for (a, (slope, &i)) in slopes.iter_mut().zip(members).enumerate() {
-            if let Some(&ahead) = members.get(a + AHEAD) {
-                self.potential.prefetch(&atoms[ahead as usize]);
-            }
+        for (slope, &i) in slopes.iter_mut().zip(members) {
             let beta = self.weight.as_constant().unwrap_or_else(|| self.weights[i as usize]);
             energy += beta * self.potential.value_and_gradient(&atoms[i as usize], slope);
             *slope = slope.map(|g| beta * g);
@@ -217,12 +246,17 @@ impl<'a, const D: usize> PairsEngine<'a, D> {
     /// Energy and gradient of all chunks, the gradient in the tree's order.
     fn gather_all(&self, atoms: &[Point<D>], slopes: &mut [Point<D>]) -> Energy {
         #[cfg(target_arch = "x86_64")]
-        let wide = super::lanes::has_avx2();
+        let (wide, more) = (super::lanes::has_avx2(), super::lanes::has_avx512());
         let gather = |(c, slopes): (usize, &mut [Point<D>])| {
+            // SAFETY: the processor has been asked whether it has these instructions.
             #[cfg(target_arch = "x86_64")]
-            if wide {
-                // SAFETY: the processor has been asked whether it has these instructions.
-                return unsafe { self.gather_avx2(atoms, c, slopes) };
+            unsafe {
+                if more {
+                    return self.gather_avx512(atoms, c, slopes);
+                }
+                if wide {
+                    return self.gather_avx2(atoms, c, slopes);
+                }
             }
             self.gather::<Plain>(atoms, c, slopes)
         };
