@@ -64,8 +64,10 @@ impl Graded {
         let grown = start.stop();
         // as the pipeline does where d varies and nothing pulls
         let scatterer = Scatterer::<2>::new();
-        let lattice = fill_holes(&scatterer, lattice, &distance, 2, &mut Silent)?.along_curve();
-        let lattice = settle(&scatterer, lattice, &distance, 3, &mut Silent)?;
+        let mut lattice = fill_holes(&scatterer, lattice, &distance, 2, &mut Silent)?.along_curve();
+        for _ in 0..3 {
+            lattice = settle(&scatterer, lattice, &distance, 4, &mut Silent)?;
+        }
         let settled = start.stop();
         let mesh = Delaunay::<2>::new().connect(lattice.atoms(), &mut Silent)?;
         let connected = start.stop();

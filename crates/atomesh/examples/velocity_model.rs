@@ -38,17 +38,18 @@ fn main() -> Result<(), Box<dyn std::error::Error>> {
     let every: usize = std::env::args().nth(1).map_or(Ok(4), |n| n.parse())?;
     let [nx, nz] = [5394 / every + 1, 1910 / every + 1];
     let grid = Grid { shape: [nx, nz], step: [12.5 * every as f64, 6.25 * every as f64] };
-    let at = |i: usize, n: usize| i as f64 / (n - 1) as f64;
-    let field: Vec<f32> =
-        (0..nx * nz).map(|i| (velocity(at(i % nx, nx), at(i / nx, nz)) / RATE) as f32).collect();
+    let d = |x: usize, z: usize| velocity(x as f64 / nx as f64, z as f64 / nz as f64) / RATE;
+    let field: Vec<f32> = (0..nx * nz).map(|i| d(i % nx, i / nx) as f32).collect();
 
     let start = Instant::now();
     let distance = NominalDistance::from_field(&grid, &field, 0.2)?;
     let (crystal, scatterer) = (Crystal::hexagonal(), Scatterer::<2>::new());
     let options = GrowOptions::default();
     let lattice = grow(&crystal, grid.bounds(), &distance, &options, &mut Silent)?.along_curve();
-    let lattice = fill_holes(&scatterer, lattice, &distance, 2, &mut Silent)?.along_curve();
-    let lattice = settle(&scatterer, lattice, &distance, 3, &mut Silent)?;
+    let mut lattice = fill_holes(&scatterer, lattice, &distance, 2, &mut Silent)?.along_curve();
+    for _ in 0..3 {
+        lattice = settle(&scatterer, lattice, &distance, 4, &mut Silent)?;
+    }
     let mesh = Delaunay::<2>::new().connect(lattice.atoms(), &mut Silent)?;
     let seconds = start.elapsed().as_secs_f64();
 

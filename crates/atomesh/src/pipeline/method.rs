@@ -23,7 +23,8 @@ pub struct Method<const D: usize> {
 pub(super) struct Evening {
     /// Meshes looked at for holes to fill.
     pub rounds: usize,
-    /// Sweeps in which atoms settle between their neighbours.
+    /// Meshes on which atoms settle between their neighbours, and sweeps on each.
+    pub meshes: usize,
     pub sweeps: usize,
 }
 
@@ -35,8 +36,9 @@ impl Method<2> {
             delaunay: Delaunay::<2>::new(),
             scatterer: Scatterer::<2>::new(),
             scattered: Filling { density: 1.15, rim: 0.3 },
-            // on a velocity model's 59,000 atoms the mean quality rose from 0.955 to 0.983
-            evening: Some(Evening { rounds: 2, sweeps: 3 }),
+            // on a velocity model's 56,000 atoms the mean quality rose from 0.955 to 0.981; with one mesh of
+            // three sweeps to 0.978
+            evening: Some(Evening { rounds: 2, meshes: 3, sweeps: 4 }),
         }
     }
 }

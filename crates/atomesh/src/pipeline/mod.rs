@@ -235,7 +235,11 @@ impl<const D: usize> Prepared<'_, D> {
         let (scatterer, distance) = (self.method.scatterer(), &self.distance);
         let lattice =
             fill_holes(scatterer, lattice.along_curve(), distance, evening.rounds, watch)?;
-        Ok(settle(scatterer, lattice.along_curve(), distance, evening.sweeps, watch)?)
+        let mut lattice = lattice.along_curve();
+        for _ in 0..evening.meshes {
+            lattice = settle(scatterer, lattice, distance, evening.sweeps, watch)?;
+        }
+        Ok(lattice)
     }
 
     /// Whether atoms stay as they were grown: nothing pulls them, and they are evened out already.
