@@ -15,7 +15,7 @@ fuzz_target!(|bytes: &[u8]| {
     let packed = decode_image(&packed, ImageFormat::NiftiGz, &options, &mut Silent);
     match (plain, packed) {
         (Ok(a), Ok(b)) => {
-            assert_eq!(a.samples().len(), a.shape().iter().product());
+            assert_eq!(a.samples().len(), a.shape().iter().product::<usize>());
             assert_eq!((a.shape(), a.type_name()), (b.shape(), b.type_name()));
             assert_eq!((a.spacing(), a.origin()), (b.spacing(), b.origin()));
         }

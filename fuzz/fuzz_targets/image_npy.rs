@@ -10,6 +10,6 @@ fuzz_target!(|bytes: &[u8]| {
     let bytes = [b"\x93NUMPY", bytes].concat();
     if let Ok(image) = decode_image(&bytes, ImageFormat::Npy, &ReadOptions::default(), &mut Silent)
     {
-        assert_eq!(image.samples().len(), image.shape().iter().product());
+        assert_eq!(image.samples().len(), image.shape().iter().product::<usize>());
     }
 });

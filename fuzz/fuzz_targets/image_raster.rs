@@ -8,7 +8,7 @@ use libfuzzer_sys::fuzz_target;
 fuzz_target!(|bytes: &[u8]| {
     for format in [ImageFormat::Png, ImageFormat::Jpeg, ImageFormat::Pnm] {
         if let Ok(image) = decode_image(bytes, format, &ReadOptions::default(), &mut Silent) {
-            assert_eq!(image.samples().len(), image.shape().iter().product());
+            assert_eq!(image.samples().len(), image.shape().iter().product::<usize>());
         }
     }
 });

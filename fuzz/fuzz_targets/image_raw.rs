@@ -2,9 +2,7 @@
 #![no_main]
 
 use atomesh::watch::Silent;
-use atomesh_io::image::{
-    ByteOrder, ImageFormat, RawLayout, ReadOptions, SampleType, decode_image,
-};
+use atomesh_io::image::{ByteOrder, ImageFormat, RawLayout, ReadOptions, SampleType, decode_image};
 use libfuzzer_sys::fuzz_target;
 
 fuzz_target!(|input: (u8, bool, u8, Vec<u64>, &[u8])| {
@@ -17,6 +15,6 @@ fuzz_target!(|input: (u8, bool, u8, Vec<u64>, &[u8])| {
     };
     let options = ReadOptions { raw: Some(layout) };
     if let Ok(image) = decode_image(bytes, ImageFormat::Raw, &options, &mut Silent) {
-        assert_eq!(image.samples().len(), image.shape().iter().product());
+        assert_eq!(image.samples().len(), image.shape().iter().product::<usize>());
     }
 });

@@ -8,6 +8,6 @@ use libfuzzer_sys::fuzz_target;
 fuzz_target!(|bytes: &[u8]| {
     if let Ok(image) = decode_image(bytes, ImageFormat::Tiff, &ReadOptions::default(), &mut Silent)
     {
-        assert_eq!(image.samples().len(), image.shape().iter().product());
+        assert_eq!(image.samples().len(), image.shape().iter().product::<usize>());
     }
 });
