@@ -70,8 +70,8 @@ impl NeighborLists {
     /// Lists, for every atom of the tree, those closer than the sum of both half reaches; `order` gives the
     /// atom at each place of the tree, and `is_own` says that this is the place's own number.
     pub fn build<const D: usize>(&mut self, tree: &Tree<D>, order: &[u32], is_own: bool) {
-        let order = (order, is_own);
-        self.chunks.resize_with(order.0.len().div_ceil(CHUNK), Chunk::default);
+        self.chunks.resize_with(order.len().div_ceil(CHUNK), Chunk::default);
+        let search = Search { tree, order, is_own };
         #[cfg(target_arch = "x86_64")]
         let (wide, more) = (super::lanes::has_avx2(), super::lanes::has_avx512());
         self.chunks.par_iter_mut().enumerate().for_each_init(
@@ -81,94 +81,86 @@ impl NeighborLists {
                 #[cfg(target_arch = "x86_64")]
                 unsafe {
                     if more {
-                        return list_chunk_avx512(tree, order, c, chunk, found);
+                        return search.list_avx512(c, chunk, found);
                     }
                     if wide {
-                        return list_chunk_avx2(tree, order, c, chunk, found);
+                        return search.list_avx2(c, chunk, found);
                     }
                 }
-                list_chunk::<Plain, D>(tree, order, c, chunk, found);
+                search.list::<Plain>(c, chunk, found);
             },
         );
     }
 }
 
-#[cfg(target_arch = "x86_64")]
-#[target_feature(enable = "avx2,popcnt")]
-fn list_chunk_avx2<const D: usize>(
-    tree: &Tree<D>,
-    order: (&[u32], bool),
-    c: usize,
-    chunk: &mut Chunk,
-    found: &mut Found<D>,
-) {
-    list_chunk::<super::lanes::Avx2, D>(tree, order, c, chunk, found);
+/// Where neighbours are looked for.
+struct Search<'a, const D: usize> {
+    tree: &'a Tree<D>,
+    order: &'a [u32],
+    is_own: bool,
 }
 
-#[cfg(target_arch = "x86_64")]
-#[target_feature(enable = "avx2,popcnt,avx512f,avx512vl,avx512dq,avx512bw")]
-fn list_chunk_avx512<const D: usize>(
-    tree: &Tree<D>,
-    order: (&[u32], bool),
-    c: usize,
-    chunk: &mut Chunk,
-    found: &mut Found<D>,
-) {
-    list_chunk::<super::lanes::Avx2, D>(tree, order, c, chunk, found);
-}
-
-#[inline(always)]
-fn list_chunk<L: Lanes, const D: usize>(
-    tree: &Tree<D>,
-    order: (&[u32], bool),
-    c: usize,
-    chunk: &mut Chunk,
-    found: &mut Found<D>,
-) {
-    let (order, is_own) = order;
-    let Found { wide: [wide, next], groups, blocks, close } = found;
-    chunk.lists.clear();
-    let mut end = 0;
-    let top = tree.height() - 1;
-    wide.clear();
-    wide.push(0);
-    for level in (2..=top).rev() {
-        tree.near::<L>(level, wide, &tree.extent(2, c), next);
-        std::mem::swap(wide, next);
+impl<const D: usize> Search<'_, D> {
+    #[cfg(target_arch = "x86_64")]
+    #[target_feature(enable = "avx2,popcnt")]
+    fn list_avx2(&self, c: usize, chunk: &mut Chunk, found: &mut Found<D>) {
+        self.list::<super::lanes::Avx2>(c, chunk, found);
     }
-    let block_count = tree.blocks.len();
-    for group in (c * LANES..(c + 1) * LANES).take_while(|g| g * LANES < block_count) {
-        if top >= 1 {
-            tree.near::<L>(1, wide, &tree.extent(1, group), groups);
-        } else {
-            groups.clone_from(wide);
+
+    #[cfg(target_arch = "x86_64")]
+    #[target_feature(enable = "avx2,popcnt,avx512f,avx512vl,avx512dq,avx512bw")]
+    fn list_avx512(&self, c: usize, chunk: &mut Chunk, found: &mut Found<D>) {
+        self.list::<super::lanes::Avx2>(c, chunk, found);
+    }
+
+    /// Makes the lists of one chunk.
+    #[inline(always)]
+    fn list<L: Lanes>(&self, c: usize, chunk: &mut Chunk, found: &mut Found<D>) {
+        let Self { tree, order, is_own } = *self;
+        let Found { wide: [wide, next], groups, blocks, close } = found;
+        chunk.lists.clear();
+        let mut end = 0;
+        let top = tree.height() - 1;
+        wide.clear();
+        wide.push(0);
+        for level in (2..=top).rev() {
+            tree.near::<L>(level, wide, &tree.extent(2, c), next);
+            std::mem::swap(wide, next);
         }
-        for block in (group * LANES..(group + 1) * LANES).take_while(|&b| b < block_count) {
-            tree.near_blocks::<L>(groups, &tree.extent(0, block), blocks);
-            let own = &tree.blocks[block];
-            for (lane, &atom) in order[block * LANES..].iter().take(LANES).enumerate() {
-                let at = std::array::from_fn(|k| own.at[k][lane]);
-                let count = blocks.near::<L>(at, own.reach[lane], close);
-                let (start, room) = (end, end + LANES * (count + 1));
-                if chunk.neighbors.len() < room {
-                    chunk.neighbors.resize(room + room / 4, 0);
+        let block_count = tree.blocks.len();
+        for group in (c * LANES..(c + 1) * LANES).take_while(|g| g * LANES < block_count) {
+            if top >= 1 {
+                tree.near::<L>(1, wide, &tree.extent(1, group), groups);
+            } else {
+                groups.clone_from(wide);
+            }
+            for block in (group * LANES..(group + 1) * LANES).take_while(|&b| b < block_count) {
+                tree.near_blocks::<L>(groups, &tree.extent(0, block), blocks);
+                let own = &tree.blocks[block];
+                for (lane, &atom) in order[block * LANES..].iter().take(LANES).enumerate() {
+                    let at = std::array::from_fn(|k| own.at[k][lane]);
+                    let count = blocks.near::<L>(at, own.reach[lane], close);
+                    let (start, room) = (end, end + LANES * (count + 1));
+                    if chunk.neighbors.len() < room {
+                        chunk.neighbors.resize(room + room / 4, 0);
+                    }
+                    end = list_atom::<L, D>(
+                        tree,
+                        block,
+                        lane,
+                        &close[..count],
+                        &mut chunk.neighbors,
+                        end,
+                    );
+                    let list = List { start: start as u32, count: (end - start) as u32 };
+                    chunk.lists.push(list);
+                    let found = &mut chunk.neighbors[start..end + WIDTH];
+                    if !is_own {
+                        found[..end - start].iter_mut().for_each(|j| *j = order[*j as usize]);
+                    }
+                    found[end - start..].fill(atom);
+                    end = start + list.padded();
                 }
-                end = list_atom::<L, D>(
-                    tree,
-                    block,
-                    lane,
-                    &close[..count],
-                    &mut chunk.neighbors,
-                    end,
-                );
-                let list = List { start: start as u32, count: (end - start) as u32 };
-                chunk.lists.push(list);
-                let found = &mut chunk.neighbors[start..end + WIDTH];
-                if !is_own {
-                    found[..end - start].iter_mut().for_each(|j| *j = order[*j as usize]);
-                }
-                found[end - start..].fill(atom);
-                end = start + list.padded();
             }
         }
     }
@@ -311,9 +303,10 @@ mod tests {
         let order: Vec<u32> = (0..atoms.len() as u32).rev().collect();
         let mut lists = NeighborLists::default();
         lists.build(&tree, &order, false);
+        let search = Search { tree: &tree, order: &order, is_own: false };
         for (c, chunk) in lists.chunks.iter().enumerate() {
             let (mut plain, mut found) = (Chunk::default(), Found::default());
-            list_chunk::<Plain, 3>(&tree, (&order, false), c, &mut plain, &mut found);
+            search.list::<Plain>(c, &mut plain, &mut found);
             assert_eq!(plain.lists, chunk.lists);
             let last = plain.lists[plain.lists.len() - 1];
             let end = last.start as usize + last.padded();
