@@ -308,6 +308,7 @@ impl RunConfig {
             spacing_factor: lattice.spacing_factor.unwrap_or(default.spacing_factor),
             seed_points: seeds.map(|p| axes("--seed-point", &p.0)).collect::<Result<_, _>>()?,
             optimize,
+            improve: default.improve,
             memory_limit: None,
         })
     }

@@ -21,6 +21,8 @@ pub enum Phase {
     Optimize,
     /// Connecting the atoms.
     Connect,
+    /// Swapping cells and moving points of the mesh.
+    Improve,
     /// Measuring the mesh.
     Measure,
     /// Drawing pictures.
@@ -39,6 +41,7 @@ impl Phase {
             Phase::Grow => "grow",
             Phase::Optimize => "optimize",
             Phase::Connect => "connect",
+            Phase::Improve => "improve",
             Phase::Measure => "measure",
             Phase::Draw => "draw",
             Phase::Write => "write",

@@ -79,6 +79,16 @@ impl<const D: usize> Lattice<D> {
         self.temperature[i] = temperature;
     }
 
+    /// The axes along which each of `count` points may move, as bits, where atom i became point `merged[i]`:
+    /// those that the box leaves to every atom of the point, none where one is frozen.
+    pub(crate) fn freedom_of(&self, merged: &[u32], count: usize) -> Vec<u8> {
+        let mut freedom = vec![(1 << D) - 1; count];
+        for (i, &point) in merged.iter().enumerate() {
+            freedom[point as usize] &= if self.temperature[i] > 0.0 { self.freedom[i] } else { 0 };
+        }
+        freedom
+    }
+
     /// The same lattice with its atoms elsewhere.
     pub(crate) fn moved_to(mut self, atoms: Vec<Point<D>>) -> Self {
         assert_eq!(atoms.len(), self.atoms.len());

@@ -2,6 +2,7 @@
 
 use crate::distance::DistanceError;
 use crate::enhance::EnhanceError;
+use crate::improve::ImproveError;
 use crate::lattice::LatticeError;
 use crate::measure::MeasureError;
 use crate::mesh::ConnectError;
@@ -71,6 +72,9 @@ pub enum PipelineError {
     /// The atoms could not be connected.
     #[error(transparent)]
     Connect(ConnectError),
+    /// The mesh could not be improved.
+    #[error(transparent)]
+    Improve(ImproveError),
     /// The mesh could not be measured.
     #[error(transparent)]
     Measure(MeasureError),
@@ -89,6 +93,7 @@ impl PipelineError {
                 | Self::Lattice(LatticeError::Cancelled(_))
                 | Self::Optimize(OptimizeError::Cancelled(_))
                 | Self::Connect(ConnectError::Cancelled(_))
+                | Self::Improve(ImproveError::Cancelled(_))
                 | Self::Measure(MeasureError::Cancelled(_))
         )
     }
@@ -103,7 +108,7 @@ macro_rules! from {
         })*
     };
 }
-from!(LatticeError => Lattice, OptimizeError => Optimize, ConnectError => Connect, MeasureError => Measure);
+from!(LatticeError => Lattice, OptimizeError => Optimize, ConnectError => Connect, ImproveError => Improve, MeasureError => Measure);
 
 /// What is odd but no error.
 #[derive(Clone, Debug, PartialEq, serde::Serialize, thiserror::Error)]

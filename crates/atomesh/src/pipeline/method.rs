@@ -1,5 +1,6 @@
 //! What differs between 2-D and 3-D, as a value.
 
+use crate::improve::Improver;
 use crate::lattice::{Crystal, Scatterer};
 use crate::mesh::Delaunay;
 
@@ -8,7 +9,7 @@ use super::estimate::Filling;
 use super::options::LatticeKind;
 
 /// The crystals and the connector of one dimension.
-#[derive(Clone, Debug)]
+#[derive(Clone)]
 pub struct Method<const D: usize> {
     /// The default first.
     crystals: Vec<(LatticeKind, Crystal<D>)>,
@@ -16,6 +17,7 @@ pub struct Method<const D: usize> {
     scatterer: Scatterer<D>,
     scattered: Filling,
     evening: Option<Evening>,
+    improver: Option<&'static dyn Improver<D>>,
 }
 
 /// How a crystal grown where d varies is evened out.
@@ -39,6 +41,7 @@ impl Method<2> {
             // on a velocity model's 56,000 atoms the mean quality rose from 0.955 to 0.981; with one mesh of
             // three sweeps to 0.978
             evening: Some(Evening { rounds: 2, meshes: 3, sweeps: 4 }),
+            improver: None,
         }
     }
 }
@@ -55,6 +58,7 @@ impl Method<3> {
             scatterer: Scatterer::<3>::new(),
             scattered: Filling { density: 1.36, rim: 0.85 },
             evening: None,
+            improver: None,
         }
     }
 }
@@ -90,6 +94,11 @@ impl<const D: usize> Method<D> {
     /// How a graded crystal is evened out, if it is.
     pub(super) fn evening(&self) -> Option<Evening> {
         self.evening
+    }
+
+    /// What improves the mesh, if anything does.
+    pub(super) fn improver(&self) -> Option<&'static dyn Improver<D>> {
+        self.improver
     }
 
     /// What scatters them.

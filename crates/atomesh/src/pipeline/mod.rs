@@ -37,6 +37,7 @@ use crate::distance::{GRADIENT_LIMIT, Grading, NominalDistance, default_distance
 use crate::enhance::{self, FeatureOptions, Features};
 use crate::geometry::{Point, compact_order};
 use crate::image::{Frame, Grid, Image, Units};
+use crate::improve::{Align, ImproveReport};
 use crate::lattice::{GrowOptions, Lattice, ScatterOptions, fill_holes, grow, scatter, settle};
 use crate::mesh::{Mesh, merge_duplicates};
 use crate::optimize::{EngineKind, Fields, OptimizeReport, optimize};
@@ -249,7 +250,29 @@ impl<const D: usize> Prepared<'_, D> {
         is_even && (self.weight.as_constant() == Some(0.0) || self.potential.range() == (0.0, 0.0))
     }
 
-    /// Grows the lattice, moves the atoms, connects them.
+    /// Turns facets onto features and mends badly shaped cells, as the options ask and the method can.
+    fn improve(
+        &self,
+        mesh: Mesh<D>,
+        freedom: &[u8],
+        watch: &mut dyn Watch,
+    ) -> Result<(Mesh<D>, Option<ImproveReport>), PipelineError> {
+        let (Some(improver), false) =
+            (self.method.improver(), self.options.improve.align == Align::Off)
+        else {
+            return Ok((mesh, None));
+        };
+        let options = &self.options.improve;
+        let (mesh, report) = improver.improve(mesh, freedom, self.fields(), options, watch)?;
+        Ok((mesh, Some(report)))
+    }
+
+    /// The fields that atoms move in.
+    fn fields(&self) -> Fields<'_, D> {
+        Fields { potential: &self.potential, weight: &self.weight, distance: &self.distance }
+    }
+
+    /// Grows the lattice, moves the atoms, connects them, and improves the mesh.
     ///
     /// # Errors
     /// [`PipelineError`] if memory does not suffice, the energy is not finite, or the work was cancelled.
@@ -265,17 +288,15 @@ impl<const D: usize> Prepared<'_, D> {
         let (lattice, report) = if self.stays_as_grown() {
             (lattice, OptimizeReport::new(self.options.optimize.engine))
         } else {
-            let fields = Fields {
-                potential: &self.potential,
-                weight: &self.weight,
-                distance: &self.distance,
-            };
-            optimize(lattice, fields, &self.options.optimize, watch)?.into_parts()
+            optimize(lattice, self.fields(), &self.options.optimize, watch)?.into_parts()
         };
         // where the image alone counts, atoms may fall into the same corner
-        let (points, _) = merge_duplicates(lattice.atoms());
+        let (points, merged) = merge_duplicates(lattice.atoms());
+        let freedom = lattice.freedom_of(&merged, points.len());
+        drop(lattice);
         let mesh = self.method.delaunay().connect(&points, watch)?;
-        drop((lattice, points));
+        drop(points);
+        let (mesh, improve_report) = self.improve(mesh, &freedom, watch)?;
         let points = mesh.points().par_iter().with_min_len(1 << 10);
         let distance = points.clone().map(|p| self.distance.at(p) as f32).collect();
         let (low, high) = self.potential.range(); // a spline passes beyond it at jumps
@@ -290,6 +311,7 @@ impl<const D: usize> Prepared<'_, D> {
             frame: self.frame,
             units: self.options.units,
             optimize_report: report,
+            improve_report,
             warnings: self.warnings,
         })
     }

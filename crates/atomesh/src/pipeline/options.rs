@@ -5,6 +5,7 @@ use serde::{Deserialize, Serialize};
 use crate::enhance::FeatureOptions;
 use crate::geometry::Point;
 use crate::image::Units;
+use crate::improve::ImproveOptions;
 use crate::optimize::OptimizeOptions;
 use crate::potential::Interpolation;
 
@@ -78,6 +79,8 @@ pub struct MeshOptions<const D: usize> {
     pub seed_points: Vec<Point<D>>,
     /// How atoms are moved; its seed is the run's. Default [`OptimizeOptions::for_dimension`].
     pub optimize: OptimizeOptions,
+    /// How the mesh is improved once the atoms are connected. Default [`ImproveOptions::for_dimension`].
+    pub improve: ImproveOptions,
     /// Bytes beyond which the work is refused. Default none.
     pub memory_limit: Option<u64>,
 }
@@ -94,6 +97,7 @@ impl<const D: usize> Default for MeshOptions<D> {
             spacing_factor: 0.8,
             seed_points: Vec::new(),
             optimize: OptimizeOptions::for_dimension(D),
+            improve: ImproveOptions::for_dimension(D),
             memory_limit: None,
         }
     }

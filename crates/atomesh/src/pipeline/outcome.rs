@@ -3,6 +3,7 @@
 use crate::distance::NominalDistance;
 use crate::geometry::Point;
 use crate::image::{Frame, Grid, Units};
+use crate::improve::ImproveReport;
 use crate::measure::{
     AlignmentOptions, AlignmentReport, MeasureError, ShapeReport, alignment, features, shape,
 };
@@ -24,6 +25,7 @@ pub struct Outcome<const D: usize> {
     pub(super) frame: Frame<D>,
     pub(super) units: Units,
     pub(super) optimize_report: OptimizeReport,
+    pub(super) improve_report: Option<ImproveReport>,
     pub(super) warnings: Vec<Warning>,
 }
 
@@ -85,6 +87,11 @@ impl<const D: usize> Outcome<D> {
     /// What the optimizer did.
     pub fn optimize_report(&self) -> &OptimizeReport {
         &self.optimize_report
+    }
+
+    /// What was improved after connecting; `None` if nothing was asked for, or the dimension has no improver.
+    pub fn improve_report(&self) -> Option<&ImproveReport> {
+        self.improve_report.as_ref()
     }
 
     /// What was odd.

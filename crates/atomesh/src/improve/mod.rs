@@ -1,0 +1,100 @@
+//! Improving a mesh after its points are connected: facets turn onto features, and no cell stays flat.
+//!
+//! Delaunay's rule knows the atoms and not the image. Where two atoms on a feature are not joined, or a
+//! tetrahedron has four corners near one plane, swaps and small moves do what the rule cannot: swaps lower the
+//! mean of b along facets (Hale 2001 names them in section 2.4), moves lower the energy of facets and of shape
+//! together, and neither takes a cell below a floor on its least angle that the mesh had kept so far.
+//!
+//! [`Improver`] is the contract; each dimension has its own. Points are never added or taken away; points
+//! without freedom stay, others stay on the side of the box that they lie on.
+
+use crate::mesh::{Mesh, MeshError};
+use crate::optimize::Fields;
+use crate::watch::{Cancelled, Watch};
+
+/// How facets are aligned with features once the atoms are connected.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, serde::Serialize, serde::Deserialize)]
+#[serde(rename_all = "kebab-case")]
+pub enum Align {
+    /// Neither swaps nor moves: Delaunay's mesh as it is.
+    Off,
+    /// Swaps alone; points stay.
+    Swaps,
+    /// Swaps and moves.
+    #[default]
+    Full,
+}
+
+/// How a mesh is improved.
+#[derive(Clone, Debug, PartialEq)]
+pub struct ImproveOptions {
+    /// Which means are used.
+    pub align: Align,
+    /// The floor on the least angle of a cell, in degrees: the interior angle in 2-D, the dihedral angle in
+    /// 3-D. Cells above it are kept above it; cells below it are raised as far as they go.
+    pub min_angle: f64,
+}
+
+impl ImproveOptions {
+    /// The defaults for images of a dimension: a floor of 20° in 2-D, of 15° in 3-D.
+    pub fn for_dimension(dimension: usize) -> Self {
+        Self { align: Align::default(), min_angle: if dimension == 2 { 20.0 } else { 15.0 } }
+    }
+}
+
+/// Why a mesh could not be improved.
+#[derive(Clone, Debug, PartialEq, thiserror::Error)]
+#[non_exhaustive]
+pub enum ImproveError {
+    /// The floor is no angle that cells could keep.
+    #[error("the least angle is {value} degrees; expected {expected}")]
+    MinAngle {
+        /// The floor asked for.
+        value: f64,
+        /// What it should be.
+        expected: &'static str,
+    },
+    /// The result was no mesh.
+    #[error(transparent)]
+    Mesh(#[from] MeshError),
+    /// The caller ended the work.
+    #[error(transparent)]
+    Cancelled(#[from] Cancelled),
+}
+
+/// What improving a mesh did.
+#[derive(Clone, Debug, Default, PartialEq, serde::Serialize)]
+#[non_exhaustive]
+pub struct ImproveReport {
+    /// Rounds of swaps and moves.
+    pub rounds: usize,
+    /// Swaps made.
+    pub swaps: usize,
+    /// Moves made.
+    pub moves: usize,
+    /// The least angle before, in degrees.
+    pub angle_before: f64,
+    /// The least angle after, in degrees.
+    pub angle_after: f64,
+    /// Cells whose least angle is still below the floor.
+    pub below: usize,
+    /// Whether every cell keeps the floor; else nothing that was tried helped more.
+    pub floor_held: bool,
+}
+
+/// Improves meshes of one dimension.
+pub trait Improver<const D: usize>: Sync {
+    /// The mesh with its cells swapped and its points moved. Bit k of `freedom` of a point: it may move along
+    /// axis k. The points keep their numbers and the result is the same at any thread count.
+    ///
+    /// # Errors
+    /// [`ImproveError`] if the floor is out of range or the work was cancelled.
+    fn improve(
+        &self,
+        mesh: Mesh<D>,
+        freedom: &[u8],
+        fields: Fields<'_, D>,
+        options: &ImproveOptions,
+        watch: &mut dyn Watch,
+    ) -> Result<(Mesh<D>, ImproveReport), ImproveError>;
+}
