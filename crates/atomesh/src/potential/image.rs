@@ -152,23 +152,43 @@ impl<const D: usize> ImagePotential<D> {
         }
     }
 
-    /// Asks memory for the samples around a lattice point, so that they are at hand when it is read.
+    /// The same, where the cell of samples that the point was in last time is at hand: read anew only once
+    /// the point has left it. The result is that of [`Self::value_and_gradient`].
     #[inline(always)]
-    pub(super) fn prefetch(&self, p: &Point<D>) {
+    pub(super) fn value_and_gradient_held(
+        &self,
+        p: &Point<D>,
+        held: &mut HeldCell,
+        gradient: &mut Point<D>,
+    ) -> f64 {
+        if self.interpolation != Interpolation::Linear {
+            return self.value_and_gradient(p, gradient);
+        }
+        let (first, fraction) = self.cell(p);
+        if held.first != first {
+            *held = HeldCell { first, corners: self.corners(first) };
+        }
+        self.between(&held.corners, &fraction, gradient)
+    }
+
+    /// Asks memory for the samples around a lattice point, so that they are at hand when it is read, unless
+    /// they are held.
+    #[inline(always)]
+    pub(super) fn prefetch(&self, p: &Point<D>, held: &HeldCell) {
         #[cfg(target_arch = "x86_64")]
         {
             use std::arch::x86_64::{_MM_HINT_T0, _mm_prefetch};
-            let samples = match self.interpolation {
-                Interpolation::Spline => &self.spline,
-                _ => &self.samples,
+            let (samples, first) = match self.interpolation {
+                Interpolation::Spline => (&self.spline, self.cell(p).0),
+                Interpolation::Nearest => (&self.samples, self.cell(p).0),
+                Interpolation::Linear => match self.cell(p).0 {
+                    first if first == held.first => return,
+                    first => (&self.samples, first),
+                },
             };
-            let cell: [usize; D] = std::array::from_fn(|k| {
-                ((p[k] * self.scale[k]) as usize).min(self.grid.shape[k].saturating_sub(2))
-            });
-            let base: usize = (0..D).map(|k| cell[k] * self.strides[k]).sum();
             for row in 0..1 << (D - 1) {
                 let set = (1..D).filter(|k| row >> (k - 1) & 1 == 1);
-                let at = base + set.map(|k| self.strides[k]).sum::<usize>();
+                let at = first + set.map(|k| self.strides[k]).sum::<usize>();
                 // SAFETY: a prefetch reads nothing, whatever the address.
                 unsafe { _mm_prefetch::<_MM_HINT_T0>(samples.as_ptr().wrapping_add(at).cast()) };
             }
@@ -199,28 +219,48 @@ impl<const D: usize> ImagePotential<D> {
         f64::from(self.samples[at])
     }
 
-    /// Linear interpolation, one axis folded away at a time.
+    /// Linear interpolation.
     #[inline(always)]
     fn linear(&self, p: &Point<D>, gradient: &mut Point<D>) -> f64 {
-        let mut base = 0;
+        let (first, fraction) = self.cell(p);
+        self.between(&self.corners(first), &fraction, gradient)
+    }
+
+    /// The first sample of the cell of samples around a lattice point, and where in the cell the point is,
+    /// 0…1 along each axis.
+    #[inline(always)]
+    fn cell(&self, p: &Point<D>) -> (usize, Point<D>) {
+        let mut first = 0;
         let mut fraction = [0.0; D];
-        let mut next = [0usize; D];
         for k in 0..D {
             let s = p[k] * self.scale[k];
-            let n = self.grid.shape[k];
-            let i = (s as usize).min(n.saturating_sub(2));
+            let i = (s as usize).min(self.grid.shape[k].saturating_sub(2));
             fraction[k] = (s - i as f64).clamp(0.0, 1.0);
-            base += i * self.strides[k];
-            next[k] = if n > 1 { self.strides[k] } else { 0 };
+            first += i * self.strides[k];
         }
-        // corner c of the cell is at base + the strides of its set bits; D ≤ 3, so 8 at the most
-        let mut value = [0.0f64; 8];
+        (first, fraction)
+    }
+
+    /// The samples at a cell's corners: corner c is at `first` and the strides of the set bits of c; D ≤ 3,
+    /// so there are 8 at the most.
+    #[inline(always)]
+    fn corners(&self, first: usize) -> [f32; 8] {
+        let next: [usize; D] =
+            std::array::from_fn(|k| if self.grid.shape[k] > 1 { self.strides[k] } else { 0 });
+        let mut corners = [0.0; 8];
+        for (c, b) in corners.iter_mut().enumerate().take(1 << D) {
+            let offset: usize = (0..D).map(|k| if c >> k & 1 == 1 { next[k] } else { 0 }).sum();
+            *b = self.samples[first + offset];
+        }
+        corners
+    }
+
+    /// What lies between the corners of a cell, one axis folded away at a time.
+    #[inline(always)]
+    fn between(&self, corners: &[f32; 8], fraction: &Point<D>, gradient: &mut Point<D>) -> f64 {
+        let mut value = corners.map(f64::from);
         let mut slope = [[0.0f64; 8]; D];
         let mut count = 1 << D;
-        for (c, v) in value.iter_mut().enumerate().take(count) {
-            let offset: usize = (0..D).map(|k| if c >> k & 1 == 1 { next[k] } else { 0 }).sum();
-            *v = f64::from(self.samples[base + offset]);
-        }
         for k in 0..D {
             count /= 2;
             let t = fraction[k];
@@ -238,6 +278,19 @@ impl<const D: usize> ImagePotential<D> {
         }
         value[0]
     }
+}
+
+/// The samples at the corners of the cell of samples that a point was in when it was read last.
+#[derive(Clone, Copy)]
+pub(super) struct HeldCell {
+    /// The cell's first sample; `usize::MAX`: none is held.
+    first: usize,
+    corners: [f32; 8],
+}
+
+impl HeldCell {
+    /// No cell yet.
+    pub const NONE: Self = Self { first: usize::MAX, corners: [0.0; 8] };
 }
 
 /// The index of the first sample that is outside −1…1, or NaN.

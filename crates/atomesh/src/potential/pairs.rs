@@ -16,7 +16,7 @@ use crate::geometry::{Bounds, Point, compact_order, distance_squared};
 use crate::pair;
 
 use super::engine::{Energy, Engine, ImageWeight};
-use super::image::ImagePotential;
+use super::image::{HeldCell, ImagePotential};
 use super::kernel::{Graded, Scale, Uniform, add_pairs};
 use super::lanes::{LANES, Lanes, Plain};
 use super::neighbors::{CHUNK, Chunk, NeighborLists};
@@ -58,6 +58,9 @@ pub struct PairsEngine<'a, const D: usize> {
     listed: Vec<Point<D>>,
     /// The gradient in the tree's order, where that is not the caller's.
     slopes: Vec<Point<D>>,
+    /// The samples around each atom, in the tree's order, where they were read last: most atoms stay in
+    /// their cell from one evaluation to the next, and these follow each other in memory.
+    held: Vec<HeldCell>,
 }
 
 impl<'a, const D: usize> PairsEngine<'a, D> {
@@ -83,6 +86,7 @@ impl<'a, const D: usize> PairsEngine<'a, D> {
             read: Vec::new(),
             listed: Vec::new(),
             slopes: Vec::new(),
+            held: Vec::new(),
         }
     }
 
@@ -167,17 +171,17 @@ impl<'a, const D: usize> PairsEngine<'a, D> {
 
     /// Energy and gradient of one chunk of atoms, each gathering over its own list.
     #[inline(always)]
-    fn gather<L: Lanes>(&self, atoms: &[Point<D>], c: usize, slopes: &mut [Point<D>]) -> Energy {
+    fn gather<L: Lanes>(&self, atoms: &[Point<D>], c: usize, own: Own<'_, D>) -> Energy {
         match (self.distance.is_constant(), self.weight.as_constant()) {
             (true, Some(beta)) => {
                 let inverse_squared = self.distance.least().powi(-2);
                 let scale = Uniform { inverse_squared, weight: 1.0 - beta };
-                self.gather_with::<L, _>(atoms, c, &scale, slopes)
+                self.gather_with::<L, _>(atoms, c, &scale, own)
             }
             (_, beta) => {
                 let (distances, weights) = (&self.distances[..], &self.weights[..]);
                 let scale = Graded { distances, weight: 1.0 - beta.unwrap_or(0.0), weights };
-                self.gather_with::<L, _>(atoms, c, &scale, slopes)
+                self.gather_with::<L, _>(atoms, c, &scale, own)
             }
         }
     }
@@ -189,24 +193,25 @@ impl<'a, const D: usize> PairsEngine<'a, D> {
         atoms: &[Point<D>],
         c: usize,
         scale: &S,
-        slopes: &mut [Point<D>],
+        (slopes, held): Own<'_, D>,
     ) -> Energy {
         let members = &self.order[c * CHUNK..][..slopes.len()];
         let Chunk { lists, neighbors } = &self.lists.chunks[c];
         let has_image = self.weight.as_constant() != Some(0.0);
-        let ask = |some: &[u32]| {
-            if has_image {
-                some.iter().for_each(|&i| self.potential.prefetch(&atoms[i as usize]));
-            }
+        let ask = |held: &[HeldCell], first: usize| {
+            let some = members.iter().zip(held).skip(first).take(AHEAD);
+            some.for_each(|(&i, held)| self.potential.prefetch(&atoms[i as usize], held));
         };
-        ask(&members[..AHEAD.min(members.len())]);
+        if has_image {
+            ask(held, 0);
+        }
         let mut energy = Energy::default();
         for (few, slopes) in slopes.chunks_mut(AHEAD).enumerate() {
             let (first, end) = (few * AHEAD, few * AHEAD + slopes.len());
-            ask(&members[end..(end + AHEAD).min(members.len())]);
             let these = &members[first..end];
             if has_image {
-                energy.image += self.image_part(atoms, these, slopes);
+                ask(held, end);
+                energy.image += self.image_part(atoms, these, &mut held[first..end], slopes);
             } else {
                 slopes.fill([0.0; D]);
             }
@@ -220,53 +225,69 @@ impl<'a, const D: usize> PairsEngine<'a, D> {
     /// so the result is the same to the last bit.
     #[cfg(target_arch = "x86_64")]
     #[target_feature(enable = "avx2,popcnt")]
-    fn gather_avx2(&self, atoms: &[Point<D>], c: usize, slopes: &mut [Point<D>]) -> Energy {
-        self.gather::<super::lanes::Avx2>(atoms, c, slopes)
+    fn gather_avx2(&self, atoms: &[Point<D>], c: usize, own: Own<'_, D>) -> Energy {
+        self.gather::<super::lanes::Avx2>(atoms, c, own)
     }
 
     /// The same with more registers.
     #[cfg(target_arch = "x86_64")]
     #[target_feature(enable = "avx2,popcnt,avx512f,avx512vl,avx512dq,avx512bw")]
-    fn gather_avx512(&self, atoms: &[Point<D>], c: usize, slopes: &mut [Point<D>]) -> Energy {
-        self.gather::<super::lanes::Avx2>(atoms, c, slopes)
+    fn gather_avx512(&self, atoms: &[Point<D>], c: usize, own: Own<'_, D>) -> Energy {
+        self.gather::<super::lanes::Avx2>(atoms, c, own)
     }
 
     /// The image's part of some atoms: β b, and the gradient.
     #[inline(always)]
-    fn image_part(&self, atoms: &[Point<D>], members: &[u32], slopes: &mut [Point<D>]) -> f64 {
+    fn image_part(
+        &self,
+        atoms: &[Point<D>],
+        members: &[u32],
+        held: &mut [HeldCell],
+        slopes: &mut [Point<D>],
+    ) -> f64 {
         let mut energy = 0.0;
-        for (slope, &i) in slopes.iter_mut().zip(members) {
+        for ((slope, held), &i) in slopes.iter_mut().zip(held).zip(members) {
             let beta = self.weight.as_constant().unwrap_or_else(|| self.weights[i as usize]);
-            energy += beta * self.potential.value_and_gradient(&atoms[i as usize], slope);
+            let atom = &atoms[i as usize];
+            energy += beta * self.potential.value_and_gradient_held(atom, held, slope);
             *slope = slope.map(|g| beta * g);
         }
         energy
     }
 
     /// Energy and gradient of all chunks, the gradient in the tree's order.
-    fn gather_all(&self, atoms: &[Point<D>], slopes: &mut [Point<D>]) -> Energy {
+    fn gather_all(
+        &self,
+        atoms: &[Point<D>],
+        slopes: &mut [Point<D>],
+        held: &mut [HeldCell],
+    ) -> Energy {
         #[cfg(target_arch = "x86_64")]
         let (wide, more) = (super::lanes::has_avx2(), super::lanes::has_avx512());
-        let gather = |(c, slopes): (usize, &mut [Point<D>])| {
+        let gather = |(c, own): (usize, Own<'_, D>)| {
             // SAFETY: the processor has been asked whether it has these instructions.
             #[cfg(target_arch = "x86_64")]
             unsafe {
                 if more {
-                    return self.gather_avx512(atoms, c, slopes);
+                    return self.gather_avx512(atoms, c, own);
                 }
                 if wide {
-                    return self.gather_avx2(atoms, c, slopes);
+                    return self.gather_avx2(atoms, c, own);
                 }
             }
-            self.gather::<Plain>(atoms, c, slopes)
+            self.gather::<Plain>(atoms, c, own)
         };
-        let parts: Vec<Energy> = slopes.par_chunks_mut(CHUNK).enumerate().map(gather).collect();
+        let chunks = slopes.par_chunks_mut(CHUNK).zip(held.par_chunks_mut(CHUNK)).enumerate();
+        let parts: Vec<Energy> = chunks.map(gather).collect();
         parts.iter().fold(Energy::default(), |sum, part| Energy {
             atomic: sum.atomic + part.atomic,
             image: sum.image + part.image,
         })
     }
 }
+
+/// What belongs to the atoms of one chunk: their gradient, and the samples around them.
+type Own<'a, const D: usize> = (&'a mut [Point<D>], &'a mut [HeldCell]);
 
 /// The girth of boxes of eight atoms each, if they were cubes that fill the box.
 fn cubes_girth<const D: usize>(count: usize, bounds: &Bounds<D>, scaling: &Scaling<D>) -> f64 {
@@ -295,12 +316,17 @@ impl<const D: usize> Engine<D> for PairsEngine<'_, D> {
 
     fn evaluate(&mut self, atoms: &[Point<D>], gradient: &mut [Point<D>]) -> Energy {
         assert!(atoms.len() == self.order.len() && gradient.len() == atoms.len(), "not prepared");
+        let mut held = std::mem::take(&mut self.held);
+        held.resize(atoms.len(), HeldCell::NONE);
         if self.place.is_empty() {
-            return self.gather_all(atoms, gradient);
+            let energy = self.gather_all(atoms, gradient, &mut held);
+            self.held = held;
+            return energy;
         }
         let mut slopes = std::mem::take(&mut self.slopes);
         slopes.resize(atoms.len(), [0.0; D]);
-        let energy = self.gather_all(atoms, &mut slopes);
+        let energy = self.gather_all(atoms, &mut slopes, &mut held);
+        self.held = held;
         let places = gradient.par_iter_mut().zip(&self.place).with_min_len(CHUNK);
         places.for_each(|(g, &s)| *g = slopes[s as usize]);
         self.slopes = slopes;
@@ -371,11 +397,13 @@ mod tests {
     fn wide_equals_plain<const D: usize>() {
         with_engines::<D>(|engine, atoms, _| {
             let mut slopes = vec![[0.0; D]; atoms.len()];
-            let energy = engine.gather_all(atoms, &mut slopes);
+            let mut held = vec![HeldCell::NONE; atoms.len()];
+            let energy = engine.gather_all(atoms, &mut slopes, &mut held);
             let mut plain = vec![[0.0; D]; atoms.len()];
-            let parts = plain.chunks_mut(CHUNK).enumerate();
-            let sum = parts.fold(Energy::default(), |sum, (c, plain)| {
-                let part = engine.gather::<Plain>(atoms, c, plain);
+            let mut held = vec![HeldCell::NONE; atoms.len()];
+            let parts = plain.chunks_mut(CHUNK).zip(held.chunks_mut(CHUNK)).enumerate();
+            let sum = parts.fold(Energy::default(), |sum, (c, own)| {
+                let part = engine.gather::<Plain>(atoms, c, own);
                 Energy { atomic: sum.atomic + part.atomic, image: sum.image + part.image }
             });
             assert_eq!((energy, slopes), (sum, plain));
@@ -386,5 +414,29 @@ mod tests {
     fn wide_registers_give_the_same_bits() {
         wide_equals_plain::<2>();
         wide_equals_plain::<3>();
+    }
+
+    fn held_equals_read<const D: usize>() {
+        with_engines::<D>(|engine, atoms, _| {
+            let mut random = Pcg64::seed_from_u64(6);
+            let mut atoms = atoms.to_vec();
+            let (mut held, mut read) = (vec![[0.0; D]; atoms.len()], vec![[0.0; D]; atoms.len()]);
+            for _ in 0..4 {
+                let with_held = engine.evaluate(&atoms, &mut held);
+                engine.held.clear();
+                let with_read = engine.evaluate(&atoms, &mut read);
+                assert_eq!((with_held, &held), (with_read, &read));
+                // some leave their cell of samples, others stay
+                let moved = atoms.as_flattened_mut().iter_mut();
+                moved
+                    .for_each(|x| *x = (*x + 0.3 * random.random::<f64>() - 0.15).clamp(0.0, 39.0));
+            }
+        });
+    }
+
+    #[test]
+    fn samples_held_from_before_are_those_read_anew() {
+        held_equals_read::<2>();
+        held_equals_read::<3>();
     }
 }
