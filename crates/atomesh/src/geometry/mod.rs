@@ -13,6 +13,7 @@ mod predicates;
 mod simplex;
 pub use bounds::Bounds;
 pub use compact::{BLOCK, compact_order};
+pub(crate) use order::shares;
 pub use order::{hilbert_order, lexicographic};
 pub use simplex::Simplex;
 

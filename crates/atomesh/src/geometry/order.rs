@@ -54,23 +54,63 @@ pub fn hilbert_order<const D: usize>(points: &[Point<D>]) -> Vec<u32> {
 /// The leading bits of a key by which points are dealt before they are sorted.
 const DEALT_BITS: usize = 12;
 
-/// The keyed indices by the leading bits of their keys of `bits` bits, and where each share ends.
+/// The keyed indices by the leading bits of their keys of `bits` bits, and where each hand ends.
 fn deal(keyed: &[(u64, u32)], bits: usize) -> (Vec<(u64, u32)>, Vec<usize>) {
     let shift = bits.saturating_sub(DEALT_BITS);
-    let share = |key: u64| (key >> shift) as usize;
-    let mut ends = vec![0; 1 << bits.min(DEALT_BITS)];
-    keyed.iter().for_each(|(key, _)| ends[share(*key)] += 1);
-    let mut sum = 0;
-    for end in &mut ends {
-        (sum, *end) = (sum + *end, sum);
-    }
+    let hand = |key: u64| (key >> shift) as usize;
+    let hand_count = 1 << bits.min(DEALT_BITS);
+    let pieces = keyed.par_chunks(keyed.len().div_ceil(4 * rayon::current_num_threads()).max(1));
+    let count = |piece: &[(u64, u32)]| {
+        let mut counts = vec![0; hand_count];
+        piece.iter().for_each(|(key, _)| counts[hand(*key)] += 1);
+        counts
+    };
+    let counts: Vec<Vec<u32>> = pieces.clone().map(count).collect();
     let mut dealt = vec![(0, 0); keyed.len()];
-    for entry in keyed {
-        let at = &mut ends[share(entry.0)];
-        dealt[*at] = *entry;
-        *at += 1;
+    let shares = shares(&mut dealt, &counts);
+    pieces.zip(shares).for_each(|(piece, mut share)| {
+        piece.iter().for_each(|entry| share.put(hand(entry.0), *entry));
+    });
+    let mut end = 0;
+    let ends = (0..hand_count).map(|hand| {
+        end += counts.iter().map(|counts| counts[hand] as usize).sum::<usize>();
+        end
+    });
+    (dealt, ends.collect())
+}
+
+/// Places for the items that one piece of work deals out, in a row for each group.
+pub(crate) struct Share<'a, T> {
+    rows: Vec<&'a mut [T]>,
+}
+
+impl<T> Share<'_, T> {
+    /// Puts an item at the next place of its group.
+    ///
+    /// # Panics
+    /// If the group's row is full.
+    #[inline]
+    pub fn put(&mut self, group: usize, item: T) {
+        let row = &mut self.rows[group];
+        let (first, rest) = std::mem::take(row).split_first_mut().expect("items are counted");
+        *first = item;
+        *row = rest;
     }
-    (dealt, ends)
+}
+
+/// For each piece of work its share of the places for all items: groups follow each other, in each the
+/// pieces. `counts` are each piece's items of each group.
+pub(crate) fn shares<'a, T>(mut places: &'a mut [T], counts: &[Vec<u32>]) -> Vec<Share<'a, T>> {
+    let group_count = counts.first().map_or(0, Vec::len);
+    let empty = |_| Share { rows: Vec::with_capacity(group_count) };
+    let mut shares: Vec<Share<T>> = counts.iter().map(empty).collect();
+    for group in 0..group_count {
+        for (share, counts) in shares.iter_mut().zip(counts) {
+            let row = places.split_off_mut(..counts[group] as usize).expect("items are counted");
+            share.rows.push(row);
+        }
+    }
+    shares
 }
 
 /// Compares by x, then y (then z); 0 and −0 are equal.

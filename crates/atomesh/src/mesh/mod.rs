@@ -8,6 +8,7 @@ use crate::geometry::Simplex;
 pub(crate) use delaunay::MOST_POINTS;
 pub use delaunay::{ConnectError, Delaunay, merge_duplicates};
 pub use facets::Facet;
+use rayon::prelude::*;
 pub use validate::MeshFault;
 
 /// What is wrong with a mesh's parts.
@@ -66,12 +67,12 @@ impl<const D: usize> Mesh<D> {
         if !corners.len().is_multiple_of(Self::CORNERS) {
             return Err(MeshError::CornerCount { count: corners.len(), each: Self::CORNERS });
         }
-        for (point, p) in points.iter().enumerate() {
-            if let Some(axis) = p.iter().position(|x| !x.is_finite()) {
-                return Err(MeshError::Coordinate { point, axis, value: p[axis] });
-            }
+        let odd = |p: &[f64; D]| p.iter().position(|x| !x.is_finite());
+        if let Some(point) = points.par_iter().position_first(|p| odd(p).is_some()) {
+            let axis = odd(&points[point]).unwrap_or(0);
+            return Err(MeshError::Coordinate { point, axis, value: points[point][axis] });
         }
-        if let Some(at) = corners.iter().position(|&c| c as usize >= points.len()) {
+        if let Some(at) = corners.par_iter().position_first(|&c| c as usize >= points.len()) {
             return Err(MeshError::Corner {
                 cell: at / Self::CORNERS,
                 point: corners[at],

@@ -169,6 +169,7 @@ fn random_options<const D: usize>(random: &mut Pcg64, image: &Image<D>) -> MeshO
             seed: random.random(),
             ..Default::default()
         },
+        improve: crate::improve::ImproveOptions::for_dimension(D),
         memory_limit: None,
     }
 }

@@ -4,6 +4,7 @@
 //!    lowest corner, so that what follows stays in a processor's cache.
 //! 2. Within a block the cells are counted by their lowest corner, and those that share it sorted.
 
+use crate::geometry::shares;
 use rayon::prelude::*;
 use std::ops::Range;
 
@@ -57,10 +58,7 @@ pub(super) fn arrange<const N: usize>(sources: &[impl Cells<N>], order: &[u32]) 
     pieces.par_iter().zip(shares).for_each(|(piece, mut share)| {
         for mut corners in cells(piece) {
             sort_evenly(&mut corners);
-            let block = &mut share[block_of(&corners)];
-            let (first, rest) = std::mem::take(block).split_first_mut().expect("they are counted");
-            *first = corners;
-            *block = rest;
+            share.put(block_of(&corners), corners);
         }
     });
     let mut blocks = Vec::with_capacity(block_count);
@@ -90,21 +88,6 @@ fn pieces<const N: usize>(sources: &[impl Cells<N>]) -> Vec<(usize, Range<usize>
         (0..end).step_by(length).map(move |start| (source, start..end.min(start + length)))
     };
     sources.iter().enumerate().flat_map(of_source).collect()
-}
-
-/// For each piece its share of each block; blocks follow each other, and pieces in a block.
-fn shares<'a, const N: usize>(
-    mut cells: &'a mut [[u32; N]],
-    counts: &[Vec<u32>],
-) -> Vec<Vec<&'a mut [[u32; N]]>> {
-    let block_count = counts.first().map_or(0, Vec::len);
-    let mut shares: Vec<Vec<_>> = counts.iter().map(|_| Vec::with_capacity(block_count)).collect();
-    for block in 0..block_count {
-        for (share, counts) in shares.iter_mut().zip(counts) {
-            share.push(cells.split_off_mut(..counts[block] as usize).expect("they are counted"));
-        }
-    }
-    shares
 }
 
 /// Sorts cells of which the lowest corners are in one block, from `first` on, and gives all corners

@@ -5,11 +5,7 @@ use super::storage::Vertex;
 use super::{STRIDE, Triangulation, start};
 use crate::geometry::{Bounds, Point};
 use crate::watch::{Cancelled, Phase, Watch, check};
-use rayon::prelude::*;
-
-/// Points inserted in each of several parts between two looks at the watch: some 0.1 s. All wait for
-/// the slowest before each look, so it is longer than [`STRIDE`].
-const LONG_STRIDE: usize = 8 * STRIDE;
+use std::sync::atomic::{AtomicBool, AtomicUsize, Ordering};
 
 /// Some of the points, their triangulation, and what is left to insert.
 pub(super) struct Part {
@@ -46,28 +42,43 @@ impl Part {
         Some(Self { triangulation, bounds, order, inserted: 4 })
     }
 
-    /// Inserts the next points, so many at most.
-    pub fn insert(&mut self, most: usize) {
+    /// Inserts the next points, so many at most, and tells how many.
+    pub fn insert(&mut self, most: usize) -> usize {
         let end = self.order.len().min(self.inserted + most);
-        for &vertex in &self.order[self.inserted..end] {
-            self.triangulation.insert(vertex);
-        }
+        let next = &self.order[self.inserted..end];
+        next.iter().for_each(|&vertex| self.triangulation.insert(vertex));
+        let count = next.len();
         self.inserted = end;
+        count
     }
 }
 
-/// Inserts all points in all parts, in parallel. `share` is that of the whole work.
+/// Inserts all points in all parts, in parallel: the first on this thread, which looks at the watch, the
+/// others on others, none waiting for another before its end. `share` is that of the whole work.
 pub(super) fn grow(parts: &mut [Part], share: f64, watch: &mut dyn Watch) -> Result<(), Cancelled> {
     let count: usize = parts.iter().map(|part| part.order.len()).sum();
-    loop {
-        let inserted: usize = parts.iter().map(|part| part.inserted).sum();
-        if inserted == count {
-            return Ok(());
+    let inserted = AtomicUsize::new(parts.iter().map(|part| part.inserted).sum());
+    let is_cancelled = AtomicBool::new(false);
+    let insert = |part: &mut Part| {
+        let some = part.insert(STRIDE);
+        inserted.fetch_add(some, Ordering::Relaxed);
+        some > 0
+    };
+    let Some((first, others)) = parts.split_first_mut() else { return Ok(()) };
+    rayon::in_place_scope(|scope| {
+        for part in others {
+            let goes_on = || !is_cancelled.load(Ordering::Relaxed);
+            scope.spawn(move |_| while goes_on() && insert(part) {});
         }
-        check(watch, Phase::Connect, share * inserted as f64 / count as f64, None)?;
-        match &mut *parts {
-            [one] => one.insert(STRIDE),
-            several => several.par_iter_mut().for_each(|part| part.insert(LONG_STRIDE)),
+        loop {
+            let done = inserted.load(Ordering::Relaxed) as f64 / count as f64;
+            if let Err(cancelled) = check(watch, Phase::Connect, share * done, None) {
+                is_cancelled.store(true, Ordering::Relaxed);
+                return Err(cancelled);
+            }
+            if !insert(first) {
+                return Ok(());
+            }
         }
-    }
+    })
 }

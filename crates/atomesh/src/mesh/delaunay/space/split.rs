@@ -1,6 +1,7 @@
 //! Dividing points into parts by planes.
 
 use crate::geometry::{Bounds, Point};
+use rayon::prelude::*;
 
 /// A plane's place is the median of about so many points.
 const SAMPLE: usize = 1 << 14;
@@ -32,19 +33,18 @@ pub(super) fn split(points: &[Point<3>], ranks: Vec<u32>, part_count: usize) -> 
 /// this side leaves points on both sides.
 fn divide(points: &[Point<3>], ranks: &[u32], share: f64) -> Option<(Vec<u32>, Vec<u32>)> {
     let at = |rank: &u32| &points[*rank as usize];
-    let mut bounds = Bounds { min: *at(ranks.first()?), max: *at(ranks.first()?) };
-    ranks.iter().for_each(|rank| bounds.include(at(rank)));
-    let extent = bounds.extent();
+    let extent = bounds(points, ranks)?.extent();
     let axis = (0..3).max_by(|&i, &j| extent[i].total_cmp(&extent[j]))?;
     let stride = ranks.len().div_ceil(SAMPLE);
     let mut sample: Vec<f64> = ranks.iter().step_by(stride).map(|rank| at(rank)[axis]).collect();
     let place = ((share * sample.len() as f64) as usize).min(sample.len() - 1);
     let plane = *sample.select_nth_unstable_by(place, f64::total_cmp).1;
     // A layer of a crystal may lie on the plane: it goes where it leaves the parts more alike.
-    let count =
-        |is_low: &dyn Fn(f64) -> bool| ranks.iter().filter(|rank| is_low(at(rank)[axis])).count();
-    let below = count(&|x| x < plane);
-    let up_to = count(&|x| x <= plane);
+    let count = |is_low: fn(f64, f64) -> bool| {
+        ranks.iter().filter(|rank| is_low(at(rank)[axis], plane)).count()
+    };
+    let (below, up_to) =
+        rayon::join(|| count(|x, plane| x < plane), || count(|x, plane| x <= plane));
     let wanted = share * ranks.len() as f64;
     let off = |count: usize| {
         if count == 0 || count == ranks.len() {
@@ -57,10 +57,28 @@ fn divide(points: &[Point<3>], ranks: &[u32], share: f64) -> Option<(Vec<u32>, V
         return None;
     }
     let with_plane = off(up_to) < off(below);
-    Some(ranks.iter().partition(|rank| {
+    let is_low = |rank: &u32| {
         let x = at(rank)[axis];
         x < plane || with_plane && x == plane
-    }))
+    };
+    let those = |low: bool| ranks.iter().copied().filter(|rank| is_low(rank) == low).collect();
+    Some(rayon::join(|| those(true), || those(false)))
+}
+
+/// The box of the points with these ranks; `None` if there are none.
+fn bounds(points: &[Point<3>], ranks: &[u32]) -> Option<Bounds<3>> {
+    let of = |ranks: &[u32]| {
+        let first = &points[*ranks.first()? as usize];
+        let mut bounds = Bounds { min: *first, max: *first };
+        ranks.iter().for_each(|rank| bounds.include(&points[*rank as usize]));
+        Some(bounds)
+    };
+    let both = |mut a: Bounds<3>, b: Bounds<3>| {
+        a.include(&b.min);
+        a.include(&b.max);
+        a
+    };
+    ranks.par_chunks(SAMPLE).filter_map(of).reduce_with(both)
 }
 
 #[cfg(test)]
