@@ -51,6 +51,11 @@ impl Part {
         self.inserted = end;
         count
     }
+
+    /// Whether all points are inserted.
+    fn is_whole(&self) -> bool {
+        self.inserted == self.order.len()
+    }
 }
 
 /// Inserts all points in all parts, in parallel: the first on this thread, which looks at the watch, the
@@ -59,26 +64,25 @@ pub(super) fn grow(parts: &mut [Part], share: f64, watch: &mut dyn Watch) -> Res
     let count: usize = parts.iter().map(|part| part.order.len()).sum();
     let inserted = AtomicUsize::new(parts.iter().map(|part| part.inserted).sum());
     let is_cancelled = AtomicBool::new(false);
-    let insert = |part: &mut Part| {
-        let some = part.insert(STRIDE);
-        inserted.fetch_add(some, Ordering::Relaxed);
-        some > 0
-    };
+    let insert = |part: &mut Part| inserted.fetch_add(part.insert(STRIDE), Ordering::Relaxed);
     let Some((first, others)) = parts.split_first_mut() else { return Ok(()) };
     rayon::in_place_scope(|scope| {
         for part in others {
-            let goes_on = || !is_cancelled.load(Ordering::Relaxed);
-            scope.spawn(move |_| while goes_on() && insert(part) {});
+            let goes_on = |part: &Part| !part.is_whole() && !is_cancelled.load(Ordering::Relaxed);
+            scope.spawn(move |_| {
+                while goes_on(part) {
+                    insert(part);
+                }
+            });
         }
-        loop {
+        while !first.is_whole() {
             let done = inserted.load(Ordering::Relaxed) as f64 / count as f64;
             if let Err(cancelled) = check(watch, Phase::Connect, share * done, None) {
                 is_cancelled.store(true, Ordering::Relaxed);
                 return Err(cancelled);
             }
-            if !insert(first) {
-                return Ok(());
-            }
+            insert(first);
         }
+        Ok(())
     })
 }
