@@ -1,7 +1,7 @@
 //! What goes into a mesh file and what comes out of one.
 
 use atomesh::image::Frame;
-use atomesh::mesh::Mesh;
+use atomesh::mesh::{Mesh, Tags};
 
 /// Names that some format gives to other arrays.
 const RESERVED: [&str; 4] = ["points", "cells", "metadata", super::metadata::NAME];
@@ -70,12 +70,20 @@ pub struct MeshData<'a, const D: usize> {
     cell_fields: Vec<Field<'a>>,
     frame: Option<&'a Frame<D>>,
     provenance: Option<&'a Provenance>,
+    tags: Option<&'a Tags<D>>,
 }
 
 impl<'a, const D: usize> MeshData<'a, D> {
     /// A mesh alone. Its cells should be positive: they are written as they are.
     pub fn new(mesh: &'a Mesh<D>) -> Self {
-        Self { mesh, point_fields: vec![], cell_fields: vec![], frame: None, provenance: None }
+        Self {
+            mesh,
+            point_fields: vec![],
+            cell_fields: vec![],
+            frame: None,
+            provenance: None,
+            tags: None,
+        }
     }
 
     /// The same with a value at each point. The pipeline calls d `distance` and b `potential`.
@@ -118,6 +126,13 @@ impl<'a, const D: usize> MeshData<'a, D> {
         self
     }
 
+    /// The same with groups of facets and cells, which must be those of this mesh: ones of another are
+    /// written as they are. Formats that cannot hold them leave them out.
+    pub fn with_tags(mut self, tags: &'a Tags<D>) -> Self {
+        self.tags = Some(tags);
+        self
+    }
+
     /// The mesh, in world coordinates.
     pub fn mesh(&self) -> &'a Mesh<D> {
         self.mesh
@@ -136,6 +151,11 @@ impl<'a, const D: usize> MeshData<'a, D> {
     /// The frame of the image, if it is known.
     pub fn frame(&self) -> Option<&'a Frame<D>> {
         self.frame
+    }
+
+    /// The groups of facets and cells, if there are any.
+    pub fn tags(&self) -> Option<&'a Tags<D>> {
+        self.tags
     }
 
     /// The provenance, if it is known.
@@ -182,6 +202,8 @@ pub struct LoadedMesh<const D: usize> {
     pub mesh: Mesh<D>,
     /// The scalar fields at the points, in the file's order; other fields are left out.
     pub point_fields: Vec<OwnedField>,
+    /// The groups of facets and cells, as far as the format holds them and they are the mesh's.
+    pub tags: Tags<D>,
     /// The frame of the image that the mesh follows, if atomesh wrote the file.
     pub frame: Option<Frame<D>>,
     /// The provenance, if atomesh wrote the file.

@@ -2,7 +2,7 @@
 
 use std::io;
 
-use atomesh::mesh::{Mesh, MeshError};
+use atomesh::mesh::{Mesh, MeshError, Tags};
 
 use super::UnknownMeshFormat;
 use super::data::{AnyMesh, LoadedMesh, OwnedField};
@@ -120,5 +120,5 @@ pub(super) fn loaded<const D: usize>(
     skipped_cells: usize,
 ) -> LoadedMesh<D> {
     let (frame, provenance) = (metadata.frame(), metadata.provenance());
-    LoadedMesh { mesh, point_fields, frame, provenance, skipped_cells }
+    LoadedMesh { mesh, point_fields, tags: Tags::default(), frame, provenance, skipped_cells }
 }

@@ -28,15 +28,32 @@ impl<const D: usize> Mesh<D> {
         facets
     }
 
+    /// The facet of a cell opposite to its corner number `opposite`, its normal out of the cell if the
+    /// cell has positive orientation. The *normal* of a facet is to the right of an edge from its first
+    /// corner to its second (2-D), or on the side from which the corners of a triangle run
+    /// counter-clockwise (3-D).
+    ///
+    /// # Panics
+    /// If there is no such cell or corner.
+    pub fn facet_of(&self, cell: usize, opposite: usize) -> [u32; D] {
+        let corners = &self.corners[cell * Self::CORNERS..(cell + 1) * Self::CORNERS];
+        assert!(opposite <= D, "a cell has D + 1 corners");
+        let mut facet = std::array::from_fn(|k| corners[k + usize::from(k >= opposite)]);
+        if opposite % 2 == 1 {
+            facet.swap(D - 2, D - 1);
+        }
+        facet
+    }
+
     /// Calls `visit` with the cells beside each facet, ascending, facet after facet in lexicographic
     /// order.
     pub(super) fn each_facet(&self, mut visit: impl FnMut(&[Side<D>])) {
-        let (starts, cells) = self.cells_of_points();
+        let cells = self.cells_of_points();
         let mut sides: Vec<Side<D>> = Vec::new();
-        for point in 0..self.points.len() {
+        for point in 0..self.points.len() as u32 {
             sides.clear();
-            for &cell in &cells[starts[point] as usize..starts[point + 1] as usize] {
-                self.sides_led_by(point as u32, cell, &mut sides);
+            for &cell in cells.of(point) {
+                self.sides_led_by(point, cell, &mut sides);
             }
             sides.sort_unstable();
             sides.chunk_by(|a, b| a.0 == b.0).for_each(&mut visit);
@@ -56,9 +73,8 @@ impl<const D: usize> Mesh<D> {
         }
     }
 
-    /// The cells that have each point as a corner: those of point `i` are
-    /// `cells[starts[i]..starts[i + 1]]`, ascending.
-    fn cells_of_points(&self) -> (Vec<u32>, Vec<u32>) {
+    /// The cells that have each point as a corner. Cost: O(cells).
+    pub fn cells_of_points(&self) -> CellsOfPoints {
         let mut starts = vec![0_u32; self.points.len() + 1];
         for &corner in &self.corners {
             starts[corner as usize + 1] += 1;
@@ -73,7 +89,41 @@ impl<const D: usize> Mesh<D> {
             cells[*place as usize] = (at / Self::CORNERS) as u32;
             *place += 1;
         }
-        (starts, cells)
+        CellsOfPoints { starts, cells }
+    }
+
+    /// The cells that have all corners of `facet`, ascending: one or two in a valid mesh, none if this
+    /// is no facet of it.
+    pub fn cells_beside<'a>(
+        &'a self,
+        facet: &'a [u32; D],
+        cells: &'a CellsOfPoints,
+    ) -> impl Iterator<Item = u32> + 'a {
+        let has_all = |cell: &u32| {
+            let at = *cell as usize * Self::CORNERS;
+            let corners = &self.corners[at..at + Self::CORNERS];
+            facet.iter().all(|corner| corners.contains(corner))
+        };
+        cells.of(facet[0]).iter().copied().filter(has_all)
+    }
+}
+
+/// The cells of a mesh that have each point as a corner.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub struct CellsOfPoints {
+    /// Where the cells of each point begin, and where the last ones end.
+    starts: Vec<u32>,
+    cells: Vec<u32>,
+}
+
+impl CellsOfPoints {
+    /// The cells of a point, ascending; none if there is no such point.
+    #[inline]
+    pub fn of(&self, point: u32) -> &[u32] {
+        match self.starts.get(point as usize..point as usize + 2) {
+            Some(&[start, end]) => &self.cells[start as usize..end as usize],
+            _ => &[],
+        }
     }
 }
 
@@ -90,5 +140,30 @@ mod tests {
         assert_eq!(corners, [[0, 1], [0, 2], [0, 3], [1, 2], [2, 3]]);
         assert_eq!(found[1], Facet { corners: [0, 2], cell: 0, neighbour: Some(1) });
         assert_eq!(found[4], Facet { corners: [2, 3], cell: 1, neighbour: None });
+    }
+    #[test]
+    fn facets_of_a_cell_have_their_normals_out_of_it() {
+        let plane = Mesh::new(vec![[0.0, 0.0], [1.0, 0.0], [0.0, 1.0]], vec![0, 1, 2]).unwrap();
+        assert_eq!([0, 1, 2].map(|k| plane.facet_of(0, k)), [[1, 2], [2, 0], [0, 1]]);
+        let points = vec![[0.0; 3], [1.0, 0.0, 0.0], [0.0, 1.0, 0.0], [0.0, 0.0, 1.0]];
+        let space = Mesh::new(points, vec![0, 1, 2, 3]).unwrap();
+        for k in 0..4 {
+            // out of the cell: the corner opposite lies behind, and so makes a negative tetrahedron
+            let [a, b, c] = space.facet_of(0, k);
+            let simplex = space.simplex(&[a, b, c, k as u32]);
+            assert!(simplex.orientation() < 0.0, "{k}");
+        }
+    }
+
+    #[test]
+    fn cells_beside_a_facet_are_those_that_it_names() {
+        let points = vec![[0.0, 0.0], [1.0, 0.0], [1.0, 1.0], [0.0, 1.0]];
+        let mesh = Mesh::new(points, vec![0, 1, 2, 2, 3, 0]).unwrap();
+        let cells = mesh.cells_of_points();
+        let beside = |facet: [u32; 2]| mesh.cells_beside(&facet, &cells).collect::<Vec<_>>();
+        assert_eq!(beside([2, 0]), [0, 1]);
+        assert_eq!(beside([2, 3]), [1]);
+        assert!(beside([1, 3]).is_empty());
+        assert!(beside([9, 3]).is_empty());
     }
 }

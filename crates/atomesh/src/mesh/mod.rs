@@ -2,13 +2,15 @@
 
 mod delaunay;
 mod facets;
+mod tags;
 mod validate;
 
 use crate::geometry::Simplex;
 pub(crate) use delaunay::MOST_POINTS;
 pub use delaunay::{ConnectError, Delaunay, merge_duplicates};
-pub use facets::Facet;
+pub use facets::{CellsOfPoints, Facet};
 use rayon::prelude::*;
+pub use tags::{FacetGroup, Regions, Tags, TagsError};
 pub use validate::MeshFault;
 
 /// What is wrong with a mesh's parts.
