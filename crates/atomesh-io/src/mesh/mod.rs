@@ -9,6 +9,7 @@ mod data;
 mod metadata;
 pub mod msh;
 pub mod npz;
+pub mod polymesh;
 mod read;
 pub mod vtk;
 pub mod vtu;
