@@ -19,6 +19,7 @@ pub mod potential;
 pub mod lattice;
 pub mod optimize;
 pub mod improve;
+pub mod edit;
 pub mod measure;
 pub mod pipeline;
 

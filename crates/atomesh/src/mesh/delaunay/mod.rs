@@ -112,19 +112,26 @@ type Connector<const D: usize> =
 #[derive(Clone, Copy, Debug)]
 pub struct Delaunay<const D: usize> {
     connector: Connector<D>,
+    /// Puts cells, as prepared points, in the order of [`canonical::arrange`].
+    arranger: fn(&Prepared<D>, &[u32]) -> Vec<u32>,
+}
+
+/// Cells of `N` corners, prepared points, in canonical order, as the caller's indices.
+fn in_order<const D: usize, const N: usize>(prepared: &Prepared<D>, cells: &[u32]) -> Vec<u32> {
+    canonical::arrange(&[cells.as_chunks::<N>().0.to_vec()], &prepared.order)
 }
 
 impl Delaunay<2> {
     /// Triangles, by the crate `spade`.
     pub fn new() -> Self {
-        Self { connector: plane::connect }
+        Self { connector: plane::connect, arranger: |of, cells| in_order::<2, 3>(of, cells) }
     }
 }
 
 impl Delaunay<3> {
     /// Tetrahedra, by incremental insertion (Bowyer 1981, Watson 1981), on all threads.
     pub fn new() -> Self {
-        Self { connector: space::connect }
+        Self { connector: space::connect, arranger: |of, cells| in_order::<3, 4>(of, cells) }
     }
 }
 
@@ -165,5 +172,18 @@ impl<const D: usize> Delaunay<D> {
             .ok_or(ConnectError::Flat { count: points.len(), dimension: D })?;
         check(watch, Phase::Connect, 1.0, None)?;
         Ok(Mesh::new(points.par_iter().copied().collect(), corners)?)
+    }
+
+    /// The mesh of points and cells that are known to be those of [`Self::connect`], in the order of its own.
+    pub(crate) fn arrange(
+        &self,
+        points: Vec<Point<D>>,
+        corners: Vec<u32>,
+    ) -> Result<Mesh<D>, ConnectError> {
+        let prepared = Prepared::new(&points)?;
+        let mut ranks = vec![0; points.len()];
+        prepared.order.iter().zip(0..).for_each(|(&point, rank)| ranks[point as usize] = rank);
+        let cells: Vec<u32> = corners.iter().map(|&point| ranks[point as usize]).collect();
+        Ok(Mesh::new(points, (self.arranger)(&prepared, &cells))?)
     }
 }
