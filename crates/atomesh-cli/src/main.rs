@@ -46,6 +46,7 @@ struct Cli {
 #[derive(Debug, Subcommand)]
 enum Command {
     Mesh(Box<commands::mesh::MeshArgs>),
+    Features(Box<commands::features::FeaturesArgs>),
     Report(Box<commands::report::ReportArgs>),
     Info(Box<commands::info::InfoArgs>),
     Check(commands::check::CheckArgs),
@@ -67,6 +68,7 @@ impl Cli {
         let mut watch = Progress::new(self.verbosity());
         let result = match self.command {
             Command::Mesh(args) => commands::mesh::run(*args, &mut watch),
+            Command::Features(args) => commands::features::run(&args, &mut watch),
             Command::Report(args) => commands::report::run(&args, &mut watch),
             Command::Info(args) => commands::info::run(&args, &mut watch),
             Command::Check(args) => commands::check::run(&args),

@@ -3,7 +3,9 @@
 use std::io::Write;
 use std::path::{Path, PathBuf};
 
+use atomesh::features::FeatureFacetOptions;
 use atomesh::image::{Image, Samples};
+use atomesh::mesh::{Mesh, Tags};
 use atomesh::pipeline::Outcome;
 use atomesh::watch::{Phase, Watch};
 use atomesh_draw::{PictureFormat, Style};
@@ -27,6 +29,8 @@ pub struct Outputs {
     /// The report.
     pub report: Option<PathBuf>,
     potential: Option<PathBuf>,
+    /// Facets with b up to this are tagged as features.
+    tag_features: Option<f64>,
     /// Whether the image comes from a format in which z is up where it grows.
     z_is_height: bool,
 }
@@ -65,7 +69,12 @@ impl Outputs {
             Some(ImageFormat::Nifti | ImageFormat::NiftiGz)
         );
         let report = options.report.clone();
-        Ok(Self { mesh, mesh_format, picture, report, potential, z_is_height })
+        let tag_features = options.tag_features;
+        if tag_features.is_some() && !mesh_format.holds_tags() {
+            let message = "the format holds no tags; expected .vtu, .msh, .msh2, .inp or polyMesh";
+            return Err(Failure::misuse(message).about(&mesh));
+        }
+        Ok(Self { mesh, mesh_format, picture, report, potential, tag_features, z_is_height })
     }
 
     /// Whether the image is still needed after the atoms have felt it.
@@ -94,7 +103,11 @@ impl Outputs {
         let inputs = inputs.into_iter().flatten().map(PathBuf::as_path);
         let mut taken: Vec<PathBuf> = inputs.filter_map(|p| p.canonicalize().ok()).collect();
         for path in self.paths().chain(config) {
-            check_writable(path)?;
+            if path == self.mesh {
+                self.mesh_format.check_writable(path).map_err(|e| cannot_write(path, &e))?;
+            } else {
+                check_writable(path)?;
+            }
             let name = absolute(path);
             if taken.contains(&name) {
                 let message = "would be written over another file of this run";
@@ -132,7 +145,9 @@ impl Outputs {
         let seed = options["optimize"]["seed"].as_u64().unwrap_or(0);
         let provenance = Provenance { version: env!("CARGO_PKG_VERSION").into(), options, seed };
         let mesh = outcome.world_mesh();
+        let tags = self.tags(outcome, &mesh, watch)?;
         let data = MeshData::new(&mesh).with_frame(outcome.frame()).with_provenance(&provenance);
+        let data = data.with_tags(&tags);
         let data = data
             .with_point_field("distance", outcome.distance_at_points())
             .and_then(|data| data.with_point_field("potential", outcome.potential_at_points()))
@@ -141,6 +156,31 @@ impl Outputs {
             MeshWriteError::Cancelled(_) => Failure::cancelled(),
             _ => Failure::content(e).about(&self.mesh),
         })
+    }
+}
+
+impl Outputs {
+    /// The sides of the box, and the features if they are asked for.
+    fn tags<const D: usize>(
+        &self,
+        outcome: &Outcome<D>,
+        world: &Mesh<D>,
+        watch: &mut Progress,
+    ) -> Result<Tags<D>, Failure> {
+        let sides = outcome.sides();
+        let Some(below) = self.tag_features else { return Ok(sides) };
+        let options = FeatureFacetOptions { below, ..FeatureFacetOptions::default() };
+        let found = outcome.features(world, &options, watch).map_err(|e| {
+            if e.is_cancelled() { Failure::cancelled() } else { Failure::misuse(e) }
+        })?;
+        let features = found.tags(world).map_err(Failure::content)?;
+        watch.say(&format!(
+            "{}: {} features of {} facets tagged",
+            self.mesh.display(),
+            found.features.len(),
+            found.features.iter().map(|feature| feature.facets.len()).sum::<usize>(),
+        ));
+        sides.merge(features).map_err(Failure::content)
     }
 }
 

@@ -137,13 +137,18 @@ section! {
 section! {
     /// The files that are written.
     pub struct OutputOptions {
-        /// Mesh to write: .vtu .vtk .msh (Gmsh 4.1) .msh2 (Gmsh 2.2) .npz. Coordinates are the
-        /// image's world coordinates
+        /// Mesh to write: .vtu .vtk .msh (Gmsh 4.1) .msh2 (Gmsh 2.2) .npz .inp (Abaqus), or a folder named
+        /// polyMesh (OpenFOAM). Coordinates are the image's world coordinates
         #[arg(short, long, value_name = "MESH")]
         pub output: PathBuf,
         /// Version of Gmsh's format in a .msh file. Default: 4.1
         #[arg(long, value_name = "VERSION", value_parser = ["4.1", "2.2"])]
         pub msh: String,
+        /// Tag facets along which the mean of b is at most this, such as -0.2, as features, beside the sides of
+        /// the box; `features` does it with more choice. Not in .vtk and .npz
+        #[arg(long, value_name = "B", allow_hyphen_values = true,
+            value_parser = number_in(-1.0, 1.0, "a number from -1 to 1"))]
+        pub tag_features: f64,
         /// Picture of the mesh over the image, .png or .svg; in 3-D of the three slices through the
         /// middle
         #[arg(long, value_name = "PICTURE")]

@@ -3,3 +3,4 @@
 pub mod atomic_file;
 pub mod image;
 pub mod mesh;
+pub mod surface;

@@ -20,6 +20,7 @@ pub mod lattice;
 pub mod optimize;
 pub mod improve;
 pub mod edit;
+pub mod features;
 pub mod measure;
 pub mod pipeline;
 

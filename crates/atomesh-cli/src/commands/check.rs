@@ -15,7 +15,7 @@ use crate::mesh_file;
 #[derive(Debug, clap::Args)]
 #[command(after_help = "Example:\n  atomesh check mesh.vtu")]
 pub struct CheckArgs {
-    /// Mesh to check: .vtu .vtk .msh .msh2 .npz
+    /// Mesh to check: .vtu .vtk .msh .msh2 .npz .inp
     #[arg(value_name = "MESH")]
     mesh: PathBuf,
 }

@@ -137,6 +137,13 @@ fn mesh_text<const D: usize>(
         let value = format!("{}, {least} to {greatest}", field.name);
         line(&mut text, "field", value);
     }
+    for group in loaded.tags.facet_groups() {
+        line(&mut text, "facets", format_args!("{}, {}", group.name, group.facets.len()));
+    }
+    if let Some(regions) = loaded.tags.regions() {
+        let names: Vec<_> = regions.ids().iter().map(|&id| regions.name(id)).collect();
+        line(&mut text, "regions", names.join(", "));
+    }
     if let Some(frame) = &loaded.frame {
         line(&mut text, "image", format_args!("{} samples", list(&frame.shape())));
     }

@@ -31,7 +31,7 @@ Examples:
   atomesh report brain.vtu --potential b.nii.gz --json brain.json
   atomesh report other.msh --potential b.npy --size 6 --origin -98,-134,-72")]
 pub struct ReportArgs {
-    /// Mesh to measure, in world coordinates: .vtu .vtk .msh .msh2 .npz
+    /// Mesh to measure, in world coordinates: .vtu .vtk .msh .msh2 .npz .inp
     #[arg(value_name = "MESH")]
     mesh: PathBuf,
     /// Potential b(x), an image with values in -1 (features) to 1. A frame is taken from the options

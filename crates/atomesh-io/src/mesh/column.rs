@@ -7,13 +7,13 @@ use atomesh::mesh::Mesh;
 
 /// The order of the bytes in a number.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub(super) enum Endian {
+pub(crate) enum Endian {
     Little,
     Big,
 }
 
 /// A number with a fixed place in files.
-pub(super) trait Number: Copy + Send + Sync {
+pub(crate) trait Number: Copy + Send + Sync {
     /// The bytes it takes.
     const SIZE: usize;
     /// Appends the number's bytes.
@@ -61,7 +61,7 @@ macro_rules! number {
 number!(i8, u8, i16, u16, i32, u32, i64, u64, f32, f64);
 
 /// An array of equal items that can be made from any index on.
-pub(super) struct Column<'a> {
+pub(crate) struct Column<'a> {
     count: usize,
     item_size: usize,
     fill: Box<Fill<'a>>,
@@ -144,6 +144,6 @@ impl<'a> Column<'a> {
 }
 
 /// Whether indices below `limit` fit in a signed 32-bit integer, which every reader takes.
-pub(super) fn fits_i32(limit: usize) -> bool {
+pub(crate) fn fits_i32(limit: usize) -> bool {
     i32::try_from(limit).is_ok()
 }

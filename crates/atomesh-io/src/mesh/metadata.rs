@@ -10,6 +10,22 @@ pub(super) const NAME: &str = "atomesh";
 
 /// The text for a mesh; the same for the same data.
 pub(super) fn encode<const D: usize>(data: &MeshData<D>) -> String {
+    Value::Object(object(data)).to_string()
+}
+
+/// The same with the numbers by which a format that has numbers above 0 alone knows other regions.
+pub(super) fn encode_with_regions<const D: usize>(
+    data: &MeshData<D>,
+    known_as: &[(i32, i32)],
+) -> String {
+    let mut object = object(data);
+    if !known_as.is_empty() {
+        object.insert("regions".into(), json!(known_as));
+    }
+    Value::Object(object).to_string()
+}
+
+fn object<const D: usize>(data: &MeshData<D>) -> serde_json::Map<String, Value> {
     let mut object = serde_json::Map::new();
     if let Some(p) = data.provenance() {
         object.insert("version".into(), p.version.clone().into());
@@ -27,7 +43,7 @@ pub(super) fn encode<const D: usize>(data: &MeshData<D>) -> String {
             }),
         );
     }
-    Value::Object(object).to_string()
+    object
 }
 
 /// What a file's text says; nothing where it does not say it as [`encode`] does.
@@ -38,6 +54,17 @@ impl Metadata {
     /// Reads the text; text that is not JSON says nothing.
     pub fn decode(text: &[u8]) -> Self {
         Self(serde_json::from_slice(text).unwrap_or_default())
+    }
+
+    /// Whether atomesh wrote the text.
+    pub fn is_ours(&self) -> bool {
+        self.0.is_object()
+    }
+
+    /// The regions that the file knows by other numbers: theirs, and the file's.
+    pub fn regions(&self) -> Vec<(i32, i32)> {
+        let regions = self.0.get("regions").cloned().unwrap_or_default();
+        serde_json::from_value(regions).unwrap_or_default()
     }
 
     /// The provenance.

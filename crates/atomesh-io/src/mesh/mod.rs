@@ -1,16 +1,19 @@
-//! Mesh files, written and read: VTU, VTK legacy, Gmsh MSH 4.1 and 2.2, NPZ.
+//! Mesh files, written and read: VTU, VTK legacy, Gmsh MSH 4.1 and 2.2, NPZ, Abaqus INP, OpenFOAM polyMesh.
 //!
 //! Every format holds the points in world coordinates as f64, the cells in the mesh's order, the
-//! fields at the points, and, as JSON, the image's frame and the mesh's [`Provenance`]. The same
+//! fields at the points (not INP and polyMesh), and, as JSON, the image's frame and the mesh's
+//! [`Provenance`]; all but VTK legacy and NPZ hold its tags. The same
 //! [`MeshData`] makes the same bytes, at any number of threads.
 
-mod column;
+pub(crate) mod column;
 mod data;
+pub mod inp;
 mod metadata;
 pub mod msh;
 pub mod npz;
 pub mod polymesh;
 mod read;
+mod tags;
 pub mod vtk;
 pub mod vtu;
 
@@ -37,17 +40,24 @@ pub enum MeshFormat {
     Msh(MshVersion, MshEncoding),
     /// NumPy's archive of arrays.
     Npz,
+    /// Abaqus' input file.
+    Inp,
+    /// OpenFOAM's folder of files.
+    PolyMesh,
 }
 
 impl MeshFormat {
     /// The extensions that [`of`](Self::of) knows, for messages.
-    pub const EXTENSIONS: &'static str = ".vtu, .vtk, .msh (Gmsh 4.1), .msh2 (Gmsh 2.2), .npz";
+    pub const EXTENSIONS: &'static str = ".vtu, .vtk, .msh (Gmsh 4.1), .msh2 (Gmsh 2.2), .npz, .inp (Abaqus), polyMesh (OpenFOAM's folder)";
 
-    /// The format that a file's name calls for by its extension, in any case.
+    /// The format that a file's name calls for by its extension, in any case; `polyMesh` is a folder's name.
     ///
     /// # Errors
     /// [`UnknownMeshFormat`] if the extension is missing or not one of [`EXTENSIONS`](Self::EXTENSIONS).
     pub fn of(path: &Path) -> Result<Self, UnknownMeshFormat> {
+        if path.file_name().is_some_and(|name| name == "polyMesh") {
+            return Ok(Self::PolyMesh);
+        }
         let extension = path.extension().unwrap_or_default().to_ascii_lowercase();
         match extension.to_str() {
             Some("vtu") => Ok(Self::Vtu),
@@ -55,8 +65,27 @@ impl MeshFormat {
             Some("msh") => Ok(Self::Msh(MshVersion::V41, MshEncoding::Binary)),
             Some("msh2") => Ok(Self::Msh(MshVersion::V22, MshEncoding::Binary)),
             Some("npz") => Ok(Self::Npz),
+            Some("inp") => Ok(Self::Inp),
             _ => Err(UnknownMeshFormat { path: path.into() }),
         }
+    }
+}
+
+impl MeshFormat {
+    /// Tries whether a mesh of this format could be written there, and leaves nothing behind.
+    ///
+    /// # Errors
+    /// If the folder does not exist, or may not be written to.
+    pub fn check_writable(self, path: &Path) -> io::Result<()> {
+        match self {
+            Self::PolyMesh => polymesh::check_poly_mesh_writable(path),
+            _ => AtomicFile::create(path).map(drop),
+        }
+    }
+
+    /// Whether the format holds groups of facets and regions.
+    pub fn holds_tags(self) -> bool {
+        !matches!(self, Self::Vtk | Self::Npz)
     }
 }
 
@@ -88,6 +117,9 @@ pub enum MeshWriteError {
         /// How many there may be.
         limit: usize,
     },
+    /// The cells make no sense as faces.
+    #[error(transparent)]
+    PolyMesh(#[from] polymesh::PolyMeshError),
     /// The watch ended the work.
     #[error(transparent)]
     Cancelled(#[from] Cancelled),
@@ -117,6 +149,9 @@ pub fn write_mesh_as<const D: usize>(
     data: &MeshData<D>,
     watch: &mut dyn Watch,
 ) -> Result<(), MeshWriteError> {
+    if format == MeshFormat::PolyMesh {
+        return polymesh::write_poly_mesh(path, &polymesh::PolyMesh::of_mesh(data)?, watch);
+    }
     let mut file = AtomicFile::create(path)?;
     match format {
         MeshFormat::Vtu => vtu::write_vtu(&mut file, data, watch)?,
@@ -125,23 +160,32 @@ pub fn write_mesh_as<const D: usize>(
             msh::write_msh(&mut file, data, (version, encoding), watch)?;
         }
         MeshFormat::Npz => npz::write_npz(&mut file, data, watch)?,
+        MeshFormat::Inp => inp::write_inp(&mut file, data, watch)?,
+        MeshFormat::PolyMesh => {} // a folder, written above
     }
     Ok(file.commit()?)
 }
 
 /// Reads a mesh in the format that the name calls for ([`MeshFormat::of`]; `.msh2` is read as `.msh`,
 /// whose version stands in the file). A file with tetrahedra is a volume, its triangles are left out; a
-/// file with triangles alone must lie in a plane of constant z.
+/// file with triangles alone must lie in a plane of constant z. Folders of OpenFOAM are not read here: see
+/// [`polymesh::read_poly_mesh`].
 ///
 /// # Errors
 /// [`MeshReadError`] if the format is unknown, the file cannot be read, or is not what its name says.
 pub fn read_mesh(path: &Path) -> Result<AnyMesh, MeshReadError> {
     let format = MeshFormat::of(path)?;
+    if format == MeshFormat::PolyMesh {
+        let (found, expected) = ("polyMesh".into(), "one of the others that are written");
+        return Err(MeshReadError::Unsupported { what: "mesh format to read", found, expected });
+    }
     let bytes = std::fs::read(path)?;
     match format {
         MeshFormat::Vtu => vtu::read_vtu(&bytes),
         MeshFormat::Vtk => vtk::read_vtk(&bytes),
         MeshFormat::Msh(..) => msh::read_msh(&bytes),
         MeshFormat::Npz => npz::read_npz(&bytes),
+        MeshFormat::Inp => inp::read_inp(&bytes),
+        MeshFormat::PolyMesh => Err(MeshReadError::NoCells { skipped: 0 }), // a folder, read above
     }
 }

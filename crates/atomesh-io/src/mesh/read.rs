@@ -2,11 +2,12 @@
 
 use std::io;
 
-use atomesh::mesh::{Mesh, MeshError, Tags};
+use atomesh::mesh::{Mesh, MeshError, Tags, TagsError};
 
 use super::UnknownMeshFormat;
 use super::data::{AnyMesh, LoadedMesh, OwnedField};
 use super::metadata::Metadata;
+use super::tags::RawTags;
 
 /// Why a mesh was not read.
 #[derive(Debug, thiserror::Error)]
@@ -55,6 +56,9 @@ pub enum MeshReadError {
     /// The cells or points are not valid.
     #[error(transparent)]
     Mesh(#[from] MeshError),
+    /// The groups of facets or cells are not valid.
+    #[error(transparent)]
+    Tags(#[from] TagsError),
 }
 
 /// An error at a place in the file.
@@ -84,15 +88,21 @@ pub(super) struct Parts {
     pub skipped_cells: usize,
     pub fields: Vec<OwnedField>,
     pub metadata: Metadata,
+    pub tags: RawTags,
 }
 
 impl Parts {
     /// A mesh of the tetrahedra, if there are any, or else of the triangles.
-    pub fn into_mesh(self) -> Result<AnyMesh, MeshReadError> {
+    pub fn into_mesh(mut self) -> Result<AnyMesh, MeshReadError> {
         if !self.tetrahedra.is_empty() {
-            let skipped = self.skipped_cells + self.triangles.len() / 3;
             let mesh = Mesh::new(self.points, self.tetrahedra)?;
-            return Ok(AnyMesh::Volume(loaded(mesh, self.fields, &self.metadata, skipped)));
+            let facets = std::mem::take(&mut self.tags.triangles);
+            let regions = std::mem::take(&mut self.tags.tetrahedron_regions);
+            let untagged = (self.triangles.len() / 3).saturating_sub(self.tags.facet_cells);
+            let (tags, left_out) = self.tags.into_tags(&mesh, facets, regions)?;
+            let skipped = self.skipped_cells + untagged + left_out;
+            let loaded = loaded(mesh, self.fields, &self.metadata, skipped);
+            return Ok(AnyMesh::Volume(LoadedMesh { tags, ..loaded }));
         }
         if self.triangles.is_empty() {
             return Err(MeshReadError::NoCells { skipped: self.skipped_cells });
@@ -108,7 +118,12 @@ impl Parts {
         }
         let points = self.points.into_iter().map(|[x, y, _]| [x, y]).collect();
         let mesh = Mesh::new(points, self.triangles)?;
-        Ok(AnyMesh::Flat(loaded(mesh, self.fields, &self.metadata, self.skipped_cells)))
+        let facets = std::mem::take(&mut self.tags.edges);
+        let regions = std::mem::take(&mut self.tags.triangle_regions);
+        let (tags, left_out) = self.tags.into_tags(&mesh, facets, regions)?;
+        let skipped = self.skipped_cells + left_out;
+        let loaded = loaded(mesh, self.fields, &self.metadata, skipped);
+        Ok(AnyMesh::Flat(LoadedMesh { tags, ..loaded }))
     }
 }
 

@@ -1,6 +1,7 @@
 //! Facets: the edges of triangles, the faces of tetrahedra, each with the cells beside it.
 
 use super::Mesh;
+use crate::geometry::{Point, difference};
 
 /// A facet of a mesh: an edge in 2-D, a triangle in 3-D.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -43,6 +44,27 @@ impl<const D: usize> Mesh<D> {
             facet.swap(D - 2, D - 1);
         }
         facet
+    }
+
+    /// The facet's normal, as long as the facet is long (2-D) or large (3-D).
+    ///
+    /// # Panics
+    /// If a corner is no point of the mesh.
+    pub fn facet_normal(&self, facet: &[u32; D]) -> Point<D> {
+        const { assert!(D == 2 || D == 3) };
+        let at = |k: usize| &self.points[facet[k] as usize];
+        let mut normal = [0.0; D];
+        if D == 2 {
+            let v = difference(at(1), at(0));
+            (normal[0], normal[1]) = (v[1], -v[0]);
+        } else {
+            let (u, v) = (difference(at(1), at(0)), difference(at(2), at(0)));
+            for k in 0..D {
+                let (i, j) = ((k + 1) % D, (k + 2) % D);
+                normal[k] = (u[i] * v[j] - u[j] * v[i]) / 2.0;
+            }
+        }
+        normal
     }
 
     /// Calls `visit` with the cells beside each facet, ascending, facet after facet in lexicographic
@@ -145,6 +167,7 @@ mod tests {
     fn facets_of_a_cell_have_their_normals_out_of_it() {
         let plane = Mesh::new(vec![[0.0, 0.0], [1.0, 0.0], [0.0, 1.0]], vec![0, 1, 2]).unwrap();
         assert_eq!([0, 1, 2].map(|k| plane.facet_of(0, k)), [[1, 2], [2, 0], [0, 1]]);
+        assert_eq!(plane.facet_normal(&[2, 0]), [-1.0, 0.0]);
         let points = vec![[0.0; 3], [1.0, 0.0, 0.0], [0.0, 1.0, 0.0], [0.0, 0.0, 1.0]];
         let space = Mesh::new(points, vec![0, 1, 2, 3]).unwrap();
         for k in 0..4 {
@@ -152,6 +175,11 @@ mod tests {
             let [a, b, c] = space.facet_of(0, k);
             let simplex = space.simplex(&[a, b, c, k as u32]);
             assert!(simplex.orientation() < 0.0, "{k}");
+            // and the normals of a closed surface cancel
+            let normal = space.facet_normal(&[a, b, c]);
+            let expected =
+                if k == 0 { [0.5; 3] } else { [1, 2, 3].map(|j| if j == k { -0.5 } else { 0.0 }) };
+            assert_eq!(normal.map(|x| x + 0.0), expected, "{k}");
         }
     }
 

@@ -2,6 +2,7 @@
 
 use crate::distance::DistanceError;
 use crate::enhance::EnhanceError;
+use crate::features::FeaturesError;
 use crate::improve::ImproveError;
 use crate::lattice::LatticeError;
 use crate::measure::MeasureError;
@@ -75,6 +76,9 @@ pub enum PipelineError {
     /// The mesh could not be improved.
     #[error(transparent)]
     Improve(ImproveError),
+    /// Features could not be found among its facets.
+    #[error(transparent)]
+    Features(FeaturesError),
     /// The mesh could not be measured.
     #[error(transparent)]
     Measure(MeasureError),
@@ -94,6 +98,7 @@ impl PipelineError {
                 | Self::Optimize(OptimizeError::Cancelled(_))
                 | Self::Connect(ConnectError::Cancelled(_))
                 | Self::Improve(ImproveError::Cancelled(_))
+                | Self::Features(FeaturesError::Cancelled(_))
                 | Self::Measure(MeasureError::Cancelled(_))
         )
     }
@@ -108,7 +113,7 @@ macro_rules! from {
         })*
     };
 }
-from!(LatticeError => Lattice, OptimizeError => Optimize, ConnectError => Connect, ImproveError => Improve, MeasureError => Measure);
+from!(LatticeError => Lattice, OptimizeError => Optimize, ConnectError => Connect, ImproveError => Improve, FeaturesError => Features, MeasureError => Measure);
 
 /// What is odd but no error.
 #[derive(Clone, Debug, PartialEq, serde::Serialize, thiserror::Error)]

@@ -31,7 +31,7 @@ pub use error::{PipelineError, Warning};
 pub use estimate::Estimate;
 pub use method::Method;
 pub use options::{LatticeKind, MeshOptions, Size};
-pub use outcome::{MeshReport, Outcome};
+pub use outcome::{MeshReport, Outcome, sides};
 
 use crate::distance::{GRADIENT_LIMIT, Grading, NominalDistance, default_distance};
 use crate::enhance::{self, FeatureOptions, Features};

@@ -1,13 +1,14 @@
 //! What a run gives.
 
 use crate::distance::NominalDistance;
-use crate::geometry::Point;
+use crate::features::{FacetField, FeatureFacetOptions, FeatureSet, find_features};
+use crate::geometry::{Bounds, Point};
 use crate::image::{Frame, Grid, Units};
 use crate::improve::ImproveReport;
 use crate::measure::{
     AlignmentOptions, AlignmentReport, MeasureError, ShapeReport, alignment, features, shape,
 };
-use crate::mesh::Mesh;
+use crate::mesh::{Mesh, Tags};
 use crate::optimize::OptimizeReport;
 use crate::potential::ImagePotential;
 use crate::watch::Watch;
@@ -52,6 +53,25 @@ impl<const D: usize> Outcome<D> {
     /// The mesh in sample coordinates: what drawing and alignment work in.
     pub fn sample_mesh(&self) -> Mesh<D> {
         in_samples(&self.mesh, self.potential.grid())
+    }
+
+    /// The facets that follow features, in world coordinates; `world` is [`Outcome::world_mesh`].
+    ///
+    /// # Errors
+    /// [`PipelineError::Features`], also when cancelled.
+    pub fn features(
+        &self,
+        world: &Mesh<D>,
+        options: &FeatureFacetOptions,
+        watch: &mut dyn Watch,
+    ) -> Result<FeatureSet<D>, PipelineError> {
+        let field = FacetField::along(&self.mesh, &self.potential, watch)?;
+        Ok(find_features(world, &field, options)?)
+    }
+
+    /// The sides of the box as tags of [`Outcome::world_mesh`].
+    pub fn sides(&self) -> Tags<D> {
+        sides(&self.mesh, &self.potential.grid().bounds(), self.frame.is_mirrored())
     }
 
     /// d at the mesh's points, in lattice units.
@@ -108,6 +128,14 @@ impl<const D: usize> Outcome<D> {
         MeshReport::new(&self.mesh, self.potential.grid(), self.potential.samples(), size, watch)
             .map_err(PipelineError::Measure)
     }
+}
+
+/// The sides of a mesh in lattice coordinates, turned as a move to the world turns its cells; see
+/// [`Tags::sides`]. A point may be off a side by 1e-9 of the box.
+pub fn sides<const D: usize>(mesh: &Mesh<D>, bounds: &Bounds<D>, mirrored: bool) -> Tags<D> {
+    let extent = bounds.extent().into_iter().fold(0.0, f64::max);
+    let tags = Tags::sides(mesh, bounds, 1e-9 * extent);
+    if mirrored { tags.turned() } else { tags }
 }
 
 impl MeshReport {

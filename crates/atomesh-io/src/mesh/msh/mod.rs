@@ -1,9 +1,13 @@
 //! MSH, the format of Gmsh: versions 4.1 and 2.2, binary and text.
 //!
-//! Points and cells are numbered from 1 in the mesh's order and belong to one entity, numbered 1.
-//! Fields at points are `$NodeData`, fields in cells `$ElementData`. The frame and the provenance are
+//! Points and cells are numbered from 1 in the mesh's order. Points belong to one entity, numbered 1, and
+//! so do cells, unless they have regions: then each region is an entity. Regions and groups of facets are
+//! physical groups with names; where there are groups but no regions, all cells are in one named `domain`.
+//! Physical groups have numbers above 0: regions of other numbers get the next ones, and the comment tells
+//! which. Fields at points are `$NodeData`, fields in cells `$ElementData`. The frame and the provenance are
 //! JSON in `$Comments`, a section that Gmsh passes over.
 
+mod entities;
 mod read;
 mod write;
 
@@ -28,7 +32,11 @@ pub enum MshEncoding {
     Text,
 }
 
-/// Gmsh's number for a triangle (`dimension` 2) or a tetrahedron (3).
+/// Gmsh's number for a line (`dimension` 1), a triangle (2) or a tetrahedron (3).
 pub(super) fn element_type(dimension: usize) -> i32 {
-    if dimension == 2 { 2 } else { 4 }
+    match dimension {
+        1 => 1,
+        2 => 2,
+        _ => 4,
+    }
 }

@@ -24,10 +24,14 @@ pub fn read_msh(bytes: &[u8]) -> Result<AnyMesh, MeshReadError> {
         wide: true,
         index_of: Tags::default(),
         parts: Parts::default(),
+        physicals: HashMap::new(),
+        cell_tags: [Vec::new(), Vec::new()],
     };
     reader.format()?;
     while let Some(section) = reader.from.section()? {
         match section {
+            "PhysicalNames" => reader.physical_names()?,
+            "Entities" if reader.version == MshVersion::V41 => reader.entities()?,
             "Nodes" => reader.nodes()?,
             "Elements" => reader.elements()?,
             "NodeData" => reader.node_data()?,
@@ -36,6 +40,7 @@ pub fn read_msh(bytes: &[u8]) -> Result<AnyMesh, MeshReadError> {
         }
         reader.from.skip_past(&format!("$End{section}"))?;
     }
+    reader.finish();
     reader.parts.into_mesh()
 }
 
@@ -163,6 +168,10 @@ struct Reader<'a> {
     wide: bool,
     index_of: Tags,
     parts: Parts,
+    /// The physical groups of entities, by dimension and tag (4.1).
+    physicals: HashMap<(i32, i32), Vec<i32>>,
+    /// The tags of triangles and of tetrahedra.
+    cell_tags: [Vec<u64>; 2],
 }
 
 impl Reader<'_> {
@@ -281,6 +290,73 @@ impl Reader<'_> {
         Ok(())
     }
 
+    fn physical_names(&mut self) -> Result<(), MeshReadError> {
+        for _ in 0..self.text_count("names")? {
+            let line = self.from.line()?;
+            let mut words = line.splitn(3, ' ');
+            let mut number = || words.next().and_then(|word| word.parse::<i32>().ok());
+            let (Some(dimension @ 0..=3), Some(id)) = (number(), number()) else {
+                return Err(malformed(
+                    self.from.at,
+                    "dimension, number and name before this",
+                    line,
+                ));
+            };
+            let name = words.next().unwrap_or_default().trim_matches('"').to_owned();
+            self.parts.tags.names.push((dimension as usize, id, name));
+        }
+        Ok(())
+    }
+
+    /// The physical groups of each entity.
+    fn entities(&mut self) -> Result<(), MeshReadError> {
+        let mut counts = [0; 4];
+        for count in &mut counts {
+            *count = self.count("entities")?;
+        }
+        for (dimension, count) in counts.into_iter().enumerate() {
+            for _ in 0..count {
+                let tag = self.from.int()?;
+                for _ in 0..if dimension == 0 { 3 } else { 6 } {
+                    self.from.real()?;
+                }
+                let mut physicals = Vec::new();
+                for _ in 0..self.count("physical groups")? {
+                    physicals.push(self.from.int()?.saturating_abs());
+                }
+                for _ in 0..if dimension == 0 { 0 } else { self.count("bounding entities")? } {
+                    self.from.int()?;
+                }
+                self.physicals.insert((dimension as i32, tag), physicals);
+            }
+        }
+        Ok(())
+    }
+
+    /// Puts regions and cells as they were, if atomesh wrote them, once all sections are read.
+    fn finish(&mut self) {
+        let parts = &mut self.parts;
+        let known_as = parts.metadata.regions();
+        for (region, physical) in known_as {
+            let regions = parts.tags.triangle_regions.iter_mut();
+            let regions = regions.chain(&mut parts.tags.tetrahedron_regions);
+            regions.filter(|id| **id == physical).for_each(|id| *id = region);
+            // names of facets have a lower dimension, those of cells the greatest
+            let dimension = if parts.tetrahedra.is_empty() { 2 } else { 3 };
+            let named = |(d, id, _): &&mut (usize, i32, String)| (*d, *id) == (dimension, physical);
+            if let Some(name) = parts.tags.names.iter_mut().find(named) {
+                name.1 = region;
+            }
+        }
+        if parts.metadata.is_ours() {
+            let [triangles, tetrahedra] = &self.cell_tags;
+            if parts.tetrahedra.is_empty() {
+                sort_cells::<3>(triangles, &mut parts.triangles, &mut parts.tags.triangle_regions);
+            }
+            sort_cells::<4>(tetrahedra, &mut parts.tetrahedra, &mut parts.tags.tetrahedron_regions);
+        }
+    }
+
     fn elements(&mut self) -> Result<(), MeshReadError> {
         match self.version {
             MshVersion::V41 => self.elements_41(),
@@ -294,13 +370,13 @@ impl Reader<'_> {
             self.size()?; // cells, least and greatest tag
         }
         for _ in 0..blocks {
-            self.from.int()?;
-            self.from.int()?;
+            let entity = (self.from.int()?, self.from.int()?);
+            let physicals = self.physicals.get(&entity).cloned().unwrap_or_default();
             let kind = self.from.int()?;
             let corners = self.corner_count(kind)?;
             for _ in 0..self.count("cells")? {
-                self.size()?; // the cell's tag
-                self.cell(kind, corners, Self::size)?;
+                let tag = self.size()?;
+                self.cell((kind, tag), corners, &physicals, Self::size)?;
             }
         }
         Ok(())
@@ -311,9 +387,7 @@ impl Reader<'_> {
         let mut done = 0;
         while done < count {
             let text = self.from.encoding == MshEncoding::Text;
-            if text {
-                self.from.int()?; // the cell's tag
-            }
+            let mut tag = if text { self.from.int()? } else { 0 };
             let kind = self.from.int()?;
             let corners = self.corner_count(kind)?;
             let following = if text { 1 } else { self.from.int()? };
@@ -323,10 +397,18 @@ impl Reader<'_> {
                 return Err(self.from.expected("cells in this block"));
             }
             for _ in 0..following {
-                for _ in 0..tags.saturating_add(i32::from(!text)) {
-                    self.from.int()?;
+                if !text {
+                    tag = self.from.int()?;
                 }
-                self.cell(kind, corners, |reader| {
+                let mut physical = [0];
+                for k in 0..tags {
+                    let value = self.from.int()?;
+                    if k == 0 {
+                        physical = [value.saturating_abs()];
+                    }
+                }
+                let physicals = &physical[..usize::from(physical[0] != 0)];
+                self.cell((kind, self.tag(tag)?), corners, physicals, |reader| {
                     let tag = reader.from.int()?;
                     reader.tag(tag)
                 })?;
@@ -344,26 +426,43 @@ impl Reader<'_> {
         })
     }
 
-    /// Reads the corners of a cell and keeps it if it is a triangle or a tetrahedron.
+    /// Reads the corners of a cell of a type and tag and keeps it if it is a triangle, a tetrahedron, or a
+    /// line of a physical group.
     fn cell(
         &mut self,
-        kind: i32,
+        (kind, tag): (i32, u64),
         corners: usize,
+        physicals: &[i32],
         read: impl Fn(&mut Self) -> Result<u64, MeshReadError>,
     ) -> Result<(), MeshReadError> {
         let mut cell = [0; 4];
         for k in 0..corners {
             let tag = read(self)?;
-            if kind == 2 || kind == 4 {
+            if matches!(kind, 1 | 2 | 4) {
                 let index = self.index_of.index(tag);
                 cell[k] = index.ok_or_else(|| {
                     malformed(self.from.at, "a point's tag before this", tag.to_string())
                 })?;
             }
         }
+        let [a, b, c, _] = cell;
+        let region = physicals.first().copied().unwrap_or(0);
+        let tags = &mut self.parts.tags;
+        tags.has_regions |= region != 0 && kind != 1;
         match kind {
-            2 => self.parts.triangles.extend_from_slice(&cell[..3]),
-            4 => self.parts.tetrahedra.extend_from_slice(&cell),
+            1 if region != 0 => tags.edges.extend(physicals.iter().map(|&id| ([a, b], id))),
+            2 => {
+                self.parts.triangles.extend_from_slice(&cell[..3]);
+                self.cell_tags[0].push(tag);
+                tags.triangle_regions.push(region);
+                tags.facet_cells += usize::from(region != 0);
+                tags.triangles.extend(physicals.iter().map(|&id| ([a, b, c], id)));
+            }
+            4 => {
+                self.parts.tetrahedra.extend_from_slice(&cell);
+                self.cell_tags[1].push(tag);
+                tags.tetrahedron_regions.push(region);
+            }
             _ => self.parts.skipped_cells += 1,
         }
         Ok(())
@@ -408,6 +507,17 @@ impl Reader<'_> {
         }
         Ok(())
     }
+}
+
+/// Puts cells of `N` corners, with their regions, in the order of their tags.
+fn sort_cells<const N: usize>(tags: &[u64], corners: &mut Vec<u32>, regions: &mut Vec<i32>) {
+    if tags.is_sorted() {
+        return;
+    }
+    let mut order: Vec<usize> = (0..tags.len()).collect();
+    order.sort_by_key(|&cell| tags[cell]);
+    *corners = order.iter().flat_map(|&cell| &corners[cell * N..(cell + 1) * N]).copied().collect();
+    *regions = order.iter().map(|&cell| regions[cell]).collect();
 }
 
 /// How many points a cell of Gmsh's type has.

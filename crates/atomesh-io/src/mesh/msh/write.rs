@@ -2,12 +2,14 @@
 
 use std::io::Write;
 
+use atomesh::geometry::Bounds;
 use atomesh::mesh::Mesh;
 use atomesh::watch::{Phase, Watch, check};
 
 use super::super::column::{Endian, Number};
 use super::super::data::{Field, MeshData};
 use super::super::{MeshWriteError, metadata};
+use super::entities::Entities;
 use super::{MshEncoding, MshVersion, element_type};
 
 /// Bytes gathered before they are handed on.
@@ -27,22 +29,26 @@ pub fn write_msh<const D: usize>(
     (version, encoding): (MshVersion, MshEncoding),
     watch: &mut dyn Watch,
 ) -> Result<(), MeshWriteError> {
-    let count = data.mesh().points().len().max(data.mesh().cell_count());
+    let entities = Entities::of(data);
+    let elements = data.mesh().cell_count() + entities.facet_count();
+    let count = data.mesh().points().len().max(elements);
     if i32::try_from(count).is_err() {
         return Err(MeshWriteError::TooMany { format: "MSH", count, limit: i32::MAX as usize });
     }
     let steps = 2 + data.point_fields().len() + data.cell_fields().len();
     let items = (steps * count.max(1)) as f64;
     let mut numbers = Numbers { out, bytes: vec![], encoding, watch, done: 0, items };
-    numbers.head(version, &metadata::encode(data))?;
+    numbers.head(version, &metadata::encode_with_regions(data, &entities.known_as))?;
+    physical_names(&mut numbers, &entities);
     match version {
         MshVersion::V41 => {
+            entities_41(&mut numbers, data.mesh(), &entities);
             nodes_41(&mut numbers, data.mesh())?;
-            elements_41(&mut numbers, data.mesh())?;
+            elements_41(&mut numbers, data.mesh(), &entities)?;
         }
         MshVersion::V22 => {
             nodes_22(&mut numbers, data.mesh())?;
-            elements_22(&mut numbers, data.mesh())?;
+            elements_22(&mut numbers, data.mesh(), &entities)?;
         }
     }
     for field in data.point_fields() {
@@ -152,6 +158,24 @@ impl<W: Write> Numbers<'_, W> {
         Ok(())
     }
 
+    /// An element of a dimension, in the physical group and the entity of those numbers.
+    fn element_22(
+        &mut self,
+        tag: usize,
+        dimension: usize,
+        (physical, entity): (i32, usize),
+        corners: &[u32],
+    ) {
+        self.int(tag);
+        if self.encoding == MshEncoding::Text {
+            self.put(element_type(dimension));
+            self.int(2);
+        }
+        self.put(physical);
+        self.int(entity);
+        corners.iter().for_each(|&corner| self.int(corner as usize + 1));
+    }
+
     fn point<const D: usize>(&mut self, p: &[f64; D]) {
         for k in 0..3 {
             self.real(p.get(k).copied().unwrap_or(0.0));
@@ -182,27 +206,86 @@ fn nodes_41<W: Write, const D: usize>(
     Ok(())
 }
 
+/// One block an entity: the cells of each region, numbered as in the mesh, and the facets after them.
 fn elements_41<W: Write, const D: usize>(
     to: &mut Numbers<W>,
     mesh: &Mesh<D>,
+    entities: &Entities<D>,
 ) -> Result<(), MeshWriteError> {
-    let count = mesh.cell_count();
+    let count = mesh.cell_count() + entities.facets.iter().map(|e| e.facets.len()).sum::<usize>();
     to.text("$Elements\n");
-    to.sizes([1, count, count.min(1), count]);
+    to.sizes([entities.cells.len() + entities.facets.len(), count, count.min(1), count]);
     to.line();
-    to.ints([D, 1]);
-    to.put(element_type(D));
-    to.size(count);
-    to.line();
-    for (i, cell) in mesh.cells().enumerate() {
-        to.size(i + 1);
-        for &corner in cell {
-            to.size(corner as usize + 1);
+    for (at, (entity, cells)) in entities.cells_by_entity().enumerate() {
+        to.ints([D, at + 1]);
+        to.put(element_type(D));
+        to.size(entity.count);
+        to.line();
+        for cell in cells.iter().map(|&cell| cell as usize) {
+            to.size(cell + 1);
+            for &corner in &mesh.corners()[cell * (D + 1)..(cell + 1) * (D + 1)] {
+                to.size(corner as usize + 1);
+            }
+            to.item()?;
         }
-        to.item()?;
+    }
+    let mut tag = mesh.cell_count();
+    for (at, entity) in entities.facets.iter().enumerate() {
+        to.ints([D - 1, at + 1]);
+        to.put(element_type(D - 1));
+        to.size(entity.facets.len());
+        to.line();
+        for facet in &entity.facets {
+            tag += 1;
+            to.size(tag);
+            facet.iter().for_each(|&corner| to.size(corner as usize + 1));
+            to.item()?;
+        }
     }
     to.end("Elements");
     Ok(())
+}
+
+/// The names of groups and regions, if there are any.
+fn physical_names<W: Write, const D: usize>(to: &mut Numbers<W>, entities: &Entities<D>) {
+    let names = &entities.names;
+    if names.is_empty() {
+        return;
+    }
+    to.text(&format!("$PhysicalNames\n{}\n", names.len()));
+    for (dimension, number, name) in names {
+        to.text(&format!("{dimension} {number} \"{name}\"\n"));
+    }
+    to.text("$EndPhysicalNames\n");
+}
+
+/// The entities with the groups that they are in, if there are any; their boxes are the mesh's.
+fn entities_41<W: Write, const D: usize>(
+    to: &mut Numbers<W>,
+    mesh: &Mesh<D>,
+    entities: &Entities<D>,
+) {
+    if entities.names.is_empty() {
+        return;
+    }
+    to.text("$Entities\n");
+    let mut counts = [0; 4];
+    (counts[D - 1], counts[D]) = (entities.facets.len(), entities.cells.len());
+    to.sizes(counts);
+    to.line();
+    let bounds = Bounds::of(mesh.points()).unwrap_or(Bounds { min: [0.0; D], max: [0.0; D] });
+    let facets = entities.facets.iter().enumerate().map(|(at, e)| (at + 1, &e.physicals));
+    let cells = entities.cells.iter().enumerate().map(|(at, e)| (at + 1, &e.physicals));
+    for (tag, physicals) in facets.chain(cells) {
+        to.int(tag);
+        to.point(&bounds.min);
+        to.point(&bounds.max);
+        to.size(physicals.len());
+        physicals.iter().for_each(|&physical| to.put(physical));
+        to.size(0); // entities that bound it: not told
+        to.line();
+    }
+    to.end("Entities");
 }
 
 fn nodes_22<W: Write, const D: usize>(
@@ -219,28 +302,39 @@ fn nodes_22<W: Write, const D: usize>(
     Ok(())
 }
 
+/// The cells as in the mesh, then the facets, one of several groups once for each: an element has one
+/// group in this version.
 fn elements_22<W: Write, const D: usize>(
     to: &mut Numbers<W>,
     mesh: &Mesh<D>,
+    entities: &Entities<D>,
 ) -> Result<(), MeshWriteError> {
-    let (kind, count) = (element_type(D), mesh.cell_count());
-    to.text(&format!("$Elements\n{count}\n"));
+    let (cells, facets) = (mesh.cell_count(), entities.facet_count());
+    to.text(&format!("$Elements\n{}\n", cells + facets));
     let text = to.encoding == MshEncoding::Text;
-    if !text && count > 0 {
-        to.put(kind);
-        to.ints([count, 2]); // cells of that kind, each with two tags
+    if !text && cells > 0 {
+        to.put(element_type(D));
+        to.ints([cells, 2]); // cells of that kind, each with two tags
     }
-    for (i, cell) in mesh.cells().enumerate() {
-        to.int(i + 1);
-        if text {
-            to.put(kind);
-            to.int(2);
-        }
-        to.ints([0, 1]); // no physical group, entity 1
-        for &corner in cell {
-            to.int(corner as usize + 1);
-        }
+    for (cell, corners) in mesh.cells().enumerate() {
+        let entity = entities.entity_of(cell);
+        let physical = entities.cells[entity].physicals.first().copied().unwrap_or(0);
+        to.element_22(cell + 1, D, (physical, entity + 1), corners);
         to.item()?;
+    }
+    if !text && facets > 0 {
+        to.put(element_type(D - 1));
+        to.ints([facets, 2]);
+    }
+    let mut tag = cells;
+    for (at, entity) in entities.facets.iter().enumerate() {
+        for &physical in &entity.physicals {
+            for facet in &entity.facets {
+                tag += 1;
+                to.element_22(tag, D - 1, (physical, at + 1), facet);
+                to.item()?;
+            }
+        }
     }
     to.end("Elements");
     Ok(())

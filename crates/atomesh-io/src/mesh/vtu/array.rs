@@ -44,6 +44,8 @@ pub(super) struct Array<'a> {
     pub kind: &'a str,
     pub name: &'a str,
     pub components: usize,
+    /// How many tuples of components the tag says there are; only field data say it.
+    pub tuples: Option<usize>,
 }
 
 /// Runs an expression with `T` bound to the Rust type that VTK names.
@@ -122,6 +124,11 @@ impl Array<'_> {
             Place::Text(at) => Ok(words(self.text(at)).filter_map(|w| w.parse().ok()).collect()),
             _ => self.bytes(None),
         }
+    }
+
+    /// Whether the numbers are integers that 32 bits with a sign hold.
+    pub fn is_integer(&self) -> bool {
+        matches!(self.kind, "Int8" | "UInt8" | "Int16" | "UInt16" | "Int32" | "Int64")
     }
 
     fn start(&self) -> usize {

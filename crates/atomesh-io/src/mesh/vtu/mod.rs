@@ -1,5 +1,6 @@
 //! VTU, VTK's XML format for unstructured grids.
 
+pub(crate) mod appended;
 mod array;
 mod read;
 mod write;

@@ -4,6 +4,7 @@ use super::super::column::Endian;
 use super::super::data::{AnyMesh, OwnedField};
 use super::super::metadata::{self, Metadata};
 use super::super::read::{MeshReadError, Parts, excerpt, malformed};
+use super::super::tags::RawTags;
 use super::array::{Array, Layout, Place};
 use super::xml::{Event, Scanner, Tag, find};
 
@@ -20,6 +21,9 @@ pub fn read_vtu(bytes: &[u8]) -> Result<AnyMesh, MeshReadError> {
     }
     for (i, piece) in document.pieces.iter().enumerate() {
         piece.add_to(&mut parts, i == 0)?;
+    }
+    if document.pieces.len() == 1 {
+        document.add_tags(&mut parts.tags)?;
     }
     parts.into_mesh()
 }
@@ -38,6 +42,7 @@ struct Piece<'a> {
     coordinates: Vec<Array<'a>>,
     topology: Vec<Array<'a>>,
     point_data: Vec<Array<'a>>,
+    cell_data: Vec<Array<'a>>,
 }
 
 /// Where the appended data begin, and whether they are base64.
@@ -103,7 +108,48 @@ impl<'a> Document<'a> {
             ("Points", Some(piece)) => piece.coordinates.push(array()?),
             ("Cells", Some(piece)) => piece.topology.push(array()?),
             ("PointData", Some(piece)) => piece.point_data.push(array()?),
+            ("CellData", Some(piece)) => piece.cell_data.push(array()?),
             _ => {}
+        }
+        Ok(())
+    }
+
+    /// Reads the groups of facets and the names of regions, where the file has them as atomesh writes them.
+    fn add_tags(&self, tags: &mut RawTags) -> Result<(), MeshReadError> {
+        let named = |name: &str| self.field_data.iter().find(|a| a.name == name);
+        let groups = (named("facets"), named("facet_group"));
+        if let ((Some(facets), Some(group_of)), Some(dimension @ (2 | 3))) =
+            (groups, groups.0.map(|a| a.components))
+        {
+            let (Some(facet_count), Some(group_count)) = (facets.tuples, group_of.tuples) else {
+                return Ok(());
+            };
+            if facet_count != group_count {
+                let expected = format!("as many facets as groups of them, {group_count}");
+                return Err(malformed(0, expected, facet_count.to_string()));
+            }
+            let corners = facets.indices(facet_count.saturating_mul(dimension))?;
+            let group_of = group_of.reals(group_count)?;
+            for (corners, &group) in corners.chunks_exact(dimension).zip(&group_of) {
+                match *corners {
+                    [a, b] => tags.edges.push(([a, b], group as i32)),
+                    [a, b, c] => tags.triangles.push(([a, b, c], group as i32)),
+                    _ => {}
+                }
+            }
+        }
+        // the dimension of facets is one less than that of cells
+        let cells = if tags.tetrahedron_regions.is_empty() { 2 } else { 3 };
+        for (dimension, ids, names) in [
+            (cells - 1, "facet_group_ids", "facet_group_names"),
+            (cells, "region_ids", "region_names"),
+        ] {
+            let (Some(ids), Some(names)) = (named(ids), named(names)) else { continue };
+            let Some(count) = ids.tuples else { continue };
+            let (ids, names) = (ids.reals(count)?, names.string()?);
+            let names = String::from_utf8_lossy(&names).into_owned();
+            let pairs = ids.iter().zip(names.lines());
+            tags.names.extend(pairs.map(|(&id, name)| (dimension, id as i32, name.to_owned())));
         }
         Ok(())
     }
@@ -187,7 +233,8 @@ fn array<'a>(
         Some(_) => tag.count("NumberOfComponents")?,
     };
     let (kind, name) = (tag.require("type")?, tag.get("Name").unwrap_or(""));
-    Ok(Array { file, layout, place, kind, name, components })
+    let tuples = tag.get("NumberOfTuples").and_then(|count| count.trim().parse().ok());
+    Ok(Array { file, layout, place, kind, name, components, tuples })
 }
 
 impl Piece<'_> {
@@ -240,6 +287,11 @@ impl Piece<'_> {
                 malformed(self.at, expected, corner.to_string())
             })?;
         }
+        let region = self.cell_data.iter().find(|a| a.name == "region" && a.is_integer());
+        let region =
+            region.filter(|a| a.components == 1).map(|a| a.reals(self.cells)).transpose()?;
+        parts.tags.has_regions |= region.is_some();
+        let region_of = |cell: usize| region.as_ref().map_or(0, |r| r[cell] as i32);
         let mut start = 0;
         for (cell, (&end, &kind)) in ends.iter().zip(&kinds).enumerate() {
             let list = corners.get(start..end as usize);
@@ -248,8 +300,14 @@ impl Piece<'_> {
             })?;
             start = end as usize;
             match (kind, list.len()) {
-                (5, 3) => parts.triangles.extend_from_slice(list),
-                (10, 4) => parts.tetrahedra.extend_from_slice(list),
+                (5, 3) => {
+                    parts.triangles.extend_from_slice(list);
+                    parts.tags.triangle_regions.push(region_of(cell));
+                }
+                (10, 4) => {
+                    parts.tetrahedra.extend_from_slice(list);
+                    parts.tags.tetrahedron_regions.push(region_of(cell));
+                }
                 (5 | 10, found) => {
                     let expected = format!("3 or 4 corners of cell {cell}");
                     return Err(malformed(self.at, expected, found.to_string()));

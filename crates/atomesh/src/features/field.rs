@@ -1,0 +1,203 @@
+//! b along facets.
+
+use rayon::prelude::*;
+
+use super::{FacetTest, FeaturesError};
+use crate::geometry::{Point, distance_squared};
+use crate::mesh::{Facet, Mesh};
+use crate::potential::ImagePotential;
+use crate::watch::{Phase, Watch, check};
+
+/// Facets between two looks at the watch, a fixed number so that results do not depend on threads.
+const BLOCK: usize = 1 << 16;
+
+/// The most parts that an edge of a facet is divided into.
+const MOST_PARTS: f64 = 64.0;
+
+/// The facets between two cells of a mesh, each with the mean and the greatest b along it.
+///
+/// Facets on the hull are left out: nothing is on their other side.
+#[derive(Clone, Debug, PartialEq)]
+pub struct FacetField<const D: usize> {
+    facets: Vec<Facet<D>>,
+    mean: Vec<f64>,
+    greatest: Vec<f64>,
+}
+
+impl<const D: usize> FacetField<D> {
+    /// b read between samples along the facets of a mesh in the potential's lattice coordinates.
+    ///
+    /// The mean is taken over parts of equal size, by the value at the middle of each: parts of an edge are
+    /// at most half a step long (2-D), the sides of parts of a triangle at most one step (3-D), but there are
+    /// no more than 64 along a side. Along a valley one step wide and −1 deep the mean is right to 0.01. The greatest is that
+    /// of these values and those at the corners.
+    ///
+    /// # Errors
+    /// [`FeaturesError::Cancelled`] if the watch ends the work.
+    pub fn along(
+        mesh: &Mesh<D>,
+        potential: &ImagePotential<D>,
+        watch: &mut dyn Watch,
+    ) -> Result<Self, FeaturesError> {
+        let facets = inner_facets(mesh);
+        let step = potential.grid().least_step();
+        let longest = if D == 2 { 0.5 * step } else { step };
+        let mut values = Vec::with_capacity(facets.len());
+        let blocks = facets.len().div_ceil(BLOCK).max(1);
+        for (done, block) in facets.chunks(BLOCK).enumerate() {
+            check(watch, Phase::Measure, done as f64 / blocks as f64, None)?;
+            let along = block.par_iter().with_min_len(1 << 8).map(|facet| {
+                let corners = facet.corners.map(|corner| mesh.points()[corner as usize]);
+                mean_and_greatest(&corners, longest, |p| potential.value(p))
+            });
+            values.par_extend(along);
+        }
+        let (mean, greatest) = values.into_iter().unzip();
+        Ok(Self { facets, mean, greatest })
+    }
+
+    /// b along facets from its values at the mesh's points alone: the mean and the greatest of those at the
+    /// corners. What lies between is not seen: a facet whose corners are on two features seems to be on one.
+    ///
+    /// # Errors
+    /// [`FeaturesError::PointCount`] if there is not one value for each point.
+    pub fn from_points(mesh: &Mesh<D>, values: &[f32]) -> Result<Self, FeaturesError> {
+        let (found, expected) = (values.len(), mesh.points().len());
+        if found != expected {
+            return Err(FeaturesError::PointCount { found, expected });
+        }
+        let facets = inner_facets(mesh);
+        let of = |facet: &Facet<D>| facet.corners.map(|corner| f64::from(values[corner as usize]));
+        let mean = facets.iter().map(|facet| of(facet).iter().sum::<f64>() / D as f64).collect();
+        let greatest =
+            facets.iter().map(|facet| of(facet).into_iter().fold(-1.0, f64::max)).collect();
+        Ok(Self { facets, mean, greatest })
+    }
+
+    /// Facets with given means, which are the greatest values too.
+    #[cfg(test)]
+    pub(super) fn given(facets: Vec<Facet<D>>, mean: impl Fn(&Facet<D>) -> f64) -> Self {
+        let mean: Vec<f64> = facets.iter().map(mean).collect();
+        Self { facets, greatest: mean.clone(), mean }
+    }
+
+    /// The facets, in lexicographic order of their corners.
+    pub fn facets(&self) -> &[Facet<D>] {
+        &self.facets
+    }
+
+    /// The mean of b along each facet.
+    pub fn mean(&self) -> &[f64] {
+        &self.mean
+    }
+
+    /// The greatest b along each facet.
+    pub fn greatest(&self) -> &[f64] {
+        &self.greatest
+    }
+
+    /// What is held against the threshold for the facet of that index.
+    pub(super) fn value(&self, facet: usize, test: FacetTest) -> f64 {
+        match test {
+            FacetTest::Mean => self.mean[facet],
+            FacetTest::Max => self.greatest[facet],
+        }
+    }
+}
+
+fn inner_facets<const D: usize>(mesh: &Mesh<D>) -> Vec<Facet<D>> {
+    let mut facets = mesh.facets();
+    facets.retain(|facet| facet.neighbour.is_some());
+    facets
+}
+
+/// The mean of b over a segment or triangle, and its greatest value; `longest` is the greatest length of a
+/// part.
+fn mean_and_greatest<const D: usize>(
+    corners: &[Point<D>; D],
+    longest: f64,
+    b: impl Fn(&Point<D>) -> f64,
+) -> (f64, f64) {
+    let pairs = (0..D).flat_map(|i| (0..i).map(move |j| (i, j)));
+    let side = pairs.map(|(i, j)| distance_squared(&corners[i], &corners[j])).fold(0.0, f64::max);
+    let parts = (side.sqrt() / longest).ceil().clamp(1.0, MOST_PARTS) as usize;
+    let greatest_at_corners = corners.iter().map(&b).fold(-1.0, f64::max);
+    let (mut sum, mut count, mut greatest) = (0.0, 0.0, greatest_at_corners);
+    each_middle(parts, |weights: [f64; D]| {
+        let at = std::array::from_fn(|k| (0..D).map(|i| weights[i] * corners[i][k]).sum());
+        let value = b(&at);
+        sum += value;
+        count += 1.0;
+        greatest = greatest.max(value);
+    });
+    (sum / count, greatest)
+}
+
+/// Calls `visit` with the weights of the corners at the middles of the equal parts of a segment (`parts` of
+/// them) or triangle (their square).
+fn each_middle<const D: usize>(parts: usize, mut visit: impl FnMut([f64; D])) {
+    let n = parts as f64;
+    for i in 0..parts {
+        if D == 2 {
+            let share = (i as f64 + 0.5) / n;
+            visit(std::array::from_fn(|k| if k == 0 { 1.0 - share } else { share }));
+            continue;
+        }
+        for j in 0..parts - i {
+            // the part that points as the whole does, and the one that stands on its head beside it
+            let heads = if i + j + 1 < parts { 2 } else { 1 };
+            for head in 1..=heads {
+                let third = f64::from(head) / 3.0;
+                let (u, v) = ((i as f64 + third) / n, (j as f64 + third) / n);
+                visit(std::array::from_fn(|k| [1.0 - u - v, u, v][k]));
+            }
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn middles_make_the_mean_of_a_plane_exact<const D: usize>() {
+        // the mean of a linear function is its value at the centroid, 1 / D for every weight
+        for parts in 1..9 {
+            let (mut sums, mut count) = ([0.0; D], 0.0);
+            each_middle(parts, |weights: [f64; D]| {
+                (0..D).for_each(|k| sums[k] += weights[k]);
+                count += 1.0;
+            });
+            assert_eq!(count, (parts as f64).powi(D as i32 - 1));
+            for sum in sums {
+                assert!((sum / count - 1.0 / D as f64).abs() < 1e-14, "{parts}: {sum}");
+            }
+        }
+    }
+
+    #[test]
+    fn parts_are_equal_in_number_and_place_for_every_corner() {
+        middles_make_the_mean_of_a_plane_exact::<2>();
+        middles_make_the_mean_of_a_plane_exact::<3>();
+    }
+
+    fn near_a_fine_sum<const D: usize>(longest: f64) {
+        // a valley one step wide at half its depth, crossed at many angles
+        let b = |p: &Point<D>| -(-2.0 * (p[0] - 2.5).powi(2)).exp();
+        for trial in 0..40 {
+            let t = f64::from(trial);
+            let corners: [Point<D>; D] = std::array::from_fn(|i| {
+                std::array::from_fn(|k| 2.5 + 3.5 * (t * 0.37 + (5 * i + 3 * k) as f64).sin())
+            });
+            let (mean, greatest) = mean_and_greatest(&corners, longest, b);
+            let (fine, most) = mean_and_greatest(&corners, longest / 9.0, b);
+            assert!((mean - fine).abs() < 0.01, "{D}-D, {trial}: {mean} {fine}");
+            assert!((greatest - most).abs() < 0.05, "{D}-D, {trial}: {greatest} {most}");
+        }
+    }
+
+    #[test]
+    fn the_mean_is_within_a_hundredth_of_a_fine_one() {
+        near_a_fine_sum::<2>(0.5);
+        near_a_fine_sum::<3>(1.0);
+    }
+}
