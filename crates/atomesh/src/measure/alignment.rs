@@ -3,6 +3,7 @@
 use super::MeasureError;
 use super::features::{Features, check_size};
 use super::nearest::{FacetTree, Near};
+use super::precision::PrecisionReport;
 use super::statistics::{percentile, sum};
 use crate::mesh::Mesh;
 use crate::watch::{Phase, Watch, check};
@@ -53,6 +54,9 @@ pub struct AlignmentReport {
     pub dist_mean_relative: Option<f64>,
     /// The 95th percentile as a share of d.
     pub dist_p95_relative: Option<f64>,
+    /// The other way round: what of the selected facets lies on features; `None` if it was not measured.
+    #[serde(flatten)]
+    pub selected: Option<PrecisionReport>,
 }
 
 /// Measures how well the facets of `mesh`, in sample coordinates, follow `features`.
@@ -101,6 +105,7 @@ pub fn alignment<const D: usize>(
         dist_p95,
         dist_mean_relative: dist_mean.map(|d| d / options.size),
         dist_p95_relative: dist_p95.map(|d| d / options.size),
+        selected: None,
     })
 }
 

@@ -1,24 +1,33 @@
-//! How good a mesh is: the shape of its cells, and how well its facets follow the image.
+//! How good a mesh is: the shape of its cells, how well its facets follow the image, how well its cells carry it.
 //!
 //! Shape needs the mesh alone. Alignment compares it with *features*, the valleys of a potential
-//! b(x), found with sub-sample accuracy. Both are reports, plain numbers for people and for JSON;
+//! b(x), found with sub-sample accuracy. Fidelity rebuilds the image from the mesh. All are reports, plain numbers for people and for JSON;
 //! neither changes anything. All of it is the same code in 2-D and 3-D.
 
 mod alignment;
+mod angles;
 mod faces;
 mod features;
+mod fidelity;
 mod nearest;
+mod precision;
 mod shape;
 mod statistics;
 
 #[cfg(test)]
+mod fidelity_tests;
+#[cfg(test)]
 mod tests;
 
 pub use alignment::{AlignmentOptions, AlignmentReport, alignment};
+pub use angles::{SpreadReport, WantedSize, spread};
 pub use features::{Features, features};
+pub use fidelity::{FidelityReport, HomogeneityReport, fidelity, homogeneity};
+pub use precision::{FACET_THRESHOLD, PrecisionReport, precision};
 pub use shape::{CellShape, ShapeReport, cell_shape, shape, shapes};
 pub use statistics::Histogram;
 
+use crate::sample::SampleError;
 use crate::watch::Cancelled;
 
 /// Why a mesh cannot be measured.
@@ -45,7 +54,19 @@ pub enum MeasureError {
         /// The number of samples given.
         found: usize,
     },
+    /// The image cannot be sampled in the mesh's cells.
+    #[error(transparent)]
+    Sample(SampleError),
     /// The work was ended by its watch.
     #[error(transparent)]
     Cancelled(#[from] Cancelled),
+}
+
+impl From<SampleError> for MeasureError {
+    fn from(error: SampleError) -> Self {
+        match error {
+            SampleError::Cancelled(cancelled) => Self::Cancelled(cancelled),
+            _ => Self::Sample(error),
+        }
+    }
 }

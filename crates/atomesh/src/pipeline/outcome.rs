@@ -3,10 +3,12 @@
 use crate::distance::NominalDistance;
 use crate::features::{FacetField, FeatureFacetOptions, FeatureSet, find_features};
 use crate::geometry::{Bounds, Point};
-use crate::image::{Frame, Grid, Units};
+use crate::image::{Frame, Grid, Samples, Units};
 use crate::improve::ImproveReport;
 use crate::measure::{
-    AlignmentOptions, AlignmentReport, MeasureError, ShapeReport, alignment, features, shape,
+    AlignmentOptions, AlignmentReport, FACET_THRESHOLD, FidelityReport, HomogeneityReport,
+    MeasureError, ShapeReport, SpreadReport, WantedSize, alignment, features, fidelity, precision,
+    shape, spread,
 };
 use crate::mesh::{Mesh, Tags};
 use crate::optimize::OptimizeReport;
@@ -37,6 +39,12 @@ pub struct MeshReport {
     pub shape: ShapeReport,
     /// How facets follow the potential's valleys.
     pub alignment: AlignmentReport,
+    /// All angles, and edges over d.
+    pub spread: SpreadReport,
+    /// How well the mesh carries an image, if one was given.
+    pub fidelity: Option<FidelityReport>,
+    /// How pure cells are, if labels were given.
+    pub homogeneity: Option<HomogeneityReport>,
 }
 
 impl<const D: usize> Outcome<D> {
@@ -124,9 +132,25 @@ impl<const D: usize> Outcome<D> {
     /// # Errors
     /// [`PipelineError::Measure`], also when cancelled.
     pub fn report(&self, watch: &mut dyn Watch) -> Result<MeshReport, PipelineError> {
-        let size = self.distance.mean();
+        let size =
+            WantedSize { mean: self.distance.mean(), at_points: Some(&self.distance_at_points) };
         MeshReport::new(&self.mesh, self.potential.grid(), self.potential.samples(), size, watch)
             .map_err(PipelineError::Measure)
+    }
+
+    /// Measures how well the mesh carries an image on the grid of the potential.
+    ///
+    /// # Errors
+    /// [`PipelineError::Measure`], also when cancelled.
+    pub fn fidelity(
+        &self,
+        samples: &Samples,
+        watch: &mut dyn Watch,
+    ) -> Result<FidelityReport, PipelineError> {
+        let grid = self.potential.grid();
+        let frame = Frame::new(grid.shape).and_then(|frame| frame.with_spacing(grid.step));
+        let frame = frame.expect("a grid's shape and step were a frame's");
+        fidelity(&self.mesh, (&frame, samples), watch).map_err(PipelineError::Measure)
     }
 }
 
@@ -140,7 +164,8 @@ pub fn sides<const D: usize>(mesh: &Mesh<D>, bounds: &Bounds<D>, mirrored: bool)
 
 impl MeshReport {
     /// Measures a mesh in lattice coordinates against the samples of b on a grid, for features that
-    /// edges of the length `size`, in lattice units, can follow.
+    /// edges of the length `size`, in lattice units, can follow. Fidelity and homogeneity, which need
+    /// more, are left out.
     ///
     /// # Errors
     /// [`MeasureError`], also when cancelled.
@@ -148,16 +173,21 @@ impl MeshReport {
         mesh: &Mesh<D>,
         grid: &Grid<D>,
         potential: &[f32],
-        size: f64,
+        size: WantedSize<'_>,
         watch: &mut dyn Watch,
     ) -> Result<Self, MeasureError> {
+        let spread = spread(mesh, size, watch)?;
         let shape = shape(mesh, Some(&grid.bounds()), watch)?;
         // d in samples: by the geometric mean over the axes, where steps differ
-        let size = size / grid.step.iter().product::<f64>().powf(1.0 / D as f64);
+        let size = size.mean / grid.step.iter().product::<f64>().powf(1.0 / D as f64);
         let found = features(potential, grid.shape, size, watch)?;
         let options = AlignmentOptions::new(size);
-        let alignment = alignment(&in_samples(mesh, grid), &found, &options, watch)?;
-        Ok(Self { shape, alignment })
+        let mesh = in_samples(mesh, grid);
+        let mut alignment = alignment(&mesh, &found, &options, watch)?;
+        let b = (potential, grid.shape);
+        let selected = precision(&mesh, b, &found, (size, FACET_THRESHOLD), watch)?;
+        alignment.selected = Some(selected);
+        Ok(Self { shape, alignment, spread, fidelity: None, homogeneity: None })
     }
 }
 

@@ -1,0 +1,327 @@
+//! How well a mesh can carry its image: the error that is left when the image is rebuilt from the mesh.
+//!
+//! *Piecewise constant*: each cell has the mean of the samples that it overlaps, weighted by overlap
+//! ([`crate::sample`]). *Piecewise linear*: continuous, with a value at each point such that the squared
+//! differences at the samples are least (linear least squares; not the image's values at the points, which noise
+//! would spoil). Each sample counts by its box, cut at the image's rim. Both errors are root mean squares over the
+//! part of the image that the mesh covers.
+//!
+//! The least squares are solved by conjugate gradients, scaled by the diagonal, from the normal equations of each
+//! cell: A = Σ w λ λᵀ, b = Σ w v λ over the samples in it, λ their barycentric coordinates.
+
+use super::MeasureError;
+use super::statistics::{Histogram, sum, sums};
+use crate::geometry::linear::invert;
+use crate::geometry::{Point, difference};
+use crate::image::{Frame, Image, Samples, Units};
+use crate::mesh::Mesh;
+use crate::sample::{SampleOptions, Statistic, sample, sample_placed};
+use crate::watch::{Phase, Watch, check};
+use rayon::prelude::*;
+use std::sync::atomic::{AtomicU32, Ordering};
+
+/// Iterations of the conjugate gradients, at most; some 30 suffice, as the matrix is a mass matrix.
+const MOST_ITERATIONS: usize = 200;
+
+/// The share of the first residual at which they end: errors are right to its square.
+const ENOUGH: f64 = 1e-6;
+
+/// How far outside a cell a sample may be to count as inside, in barycentric coordinates.
+const SLACK: f64 = 1e-9;
+
+/// How well the image can be rebuilt from the mesh. Errors are in the image's own unit.
+#[derive(Clone, Debug, PartialEq, serde::Serialize)]
+#[non_exhaustive]
+pub struct FidelityReport {
+    /// The share of the image's box that the mesh covers.
+    pub covered: f64,
+    /// The standard deviation of the samples there.
+    pub deviation: f64,
+    /// RMS error of the means of cells.
+    pub constant_rms: f64,
+    /// RMS error of the continuous, linear least-squares fit.
+    pub linear_rms: f64,
+    /// The first as a share of the deviation; `None` for a constant image.
+    pub constant_relative: Option<f64>,
+    /// The second as a share of the deviation.
+    pub linear_relative: Option<f64>,
+    /// Iterations of the fit.
+    pub iterations: usize,
+    /// Whether they ended by their own test.
+    pub converged: bool,
+}
+
+/// How pure cells are: OOF's homogeneity.
+#[derive(Clone, Debug, PartialEq, serde::Serialize)]
+#[non_exhaustive]
+pub struct HomogeneityReport {
+    /// The share of a cell that its dominant label fills, averaged over the volume (2-D: area): 1 if no
+    /// interface runs through a cell.
+    pub mean: f64,
+    /// The least share of any cell.
+    pub min: f64,
+    /// Cells with less than 0.9 of one label.
+    pub mixed: usize,
+    /// Cells by that share, in 20 bins of 0.05.
+    pub histogram: Histogram,
+    /// Cells without samples; they count nowhere else.
+    pub without: usize,
+}
+
+/// Measures how well the mesh carries an image placed by `frame` in the mesh's coordinates.
+///
+/// # Errors
+/// [`MeasureError`] if the mesh has no cells or covers no sample, the image cannot be sampled, or the watch ends
+/// the work.
+pub fn fidelity<const D: usize>(
+    mesh: &Mesh<D>,
+    (frame, samples): (&Frame<D>, &Samples),
+    watch: &mut dyn Watch,
+) -> Result<FidelityReport, MeasureError> {
+    let none = MeasureError::NoCells { points: mesh.points().len() };
+    let kinds = [Statistic::Mean, Statistic::Std];
+    let found = sample_placed(mesh, (frame, samples), SampleOptions::new(&kinds), watch)?;
+    let [means, deviations] = [&found.values[0], &found.values[1]];
+    let weight = |i: usize| found.measures[i] * found.coverage[i];
+    let weighted = |i: usize, value: f64| if weight(i) > 0.0 { weight(i) * value } else { 0.0 };
+    let all = 0..mesh.cell_count();
+    let total = sum(all.clone(), &weight);
+    if total.is_nan() || total <= 0.0 {
+        return Err(none);
+    }
+    let mean = sum(all.clone(), &|i| weighted(i, means[i])) / total;
+    let [within, between] = sums(all, &|i| {
+        [weighted(i, deviations[i].powi(2)), weighted(i, (means[i] - mean).powi(2))]
+    })
+    .map(|s| s / total);
+    check(watch, Phase::Measure, 0.5, None)?;
+
+    let system = System::new(mesh, frame, samples, mean);
+    check(watch, Phase::Measure, 0.7, None)?;
+    let fit = system.solve(watch)?;
+    let deviation = (within + between).sqrt();
+    let (constant_rms, linear_rms) = (within.sqrt(), fit.mean_square.max(0.0).sqrt());
+    let relative = |rms: f64| (deviation > 0.0).then(|| rms / deviation);
+    let world =
+        frame.spacing().iter().product::<f64>() * frame.grid(Units::Samples).bounds().measure();
+    Ok(FidelityReport {
+        covered: (total / world).min(1.0),
+        deviation,
+        constant_rms,
+        linear_rms,
+        constant_relative: relative(constant_rms),
+        linear_relative: relative(linear_rms),
+        iterations: fit.iterations,
+        converged: fit.converged,
+    })
+}
+
+/// Measures how pure the cells of a mesh in the world are by an image of labels.
+///
+/// # Errors
+/// [`MeasureError`] if the mesh has no cells with labels, the image holds no labels, or the watch ends the work.
+pub fn homogeneity<const D: usize>(
+    mesh: &Mesh<D>,
+    labels: &Image<D>,
+    watch: &mut dyn Watch,
+) -> Result<HomogeneityReport, MeasureError> {
+    let options = SampleOptions::new(&[Statistic::Homogeneity]);
+    let found = sample(mesh, labels, options, watch)?;
+    let of_cells = &found.values[0];
+    let known: Vec<f64> = of_cells.iter().copied().filter(|share| share.is_finite()).collect();
+    if known.is_empty() {
+        return Err(MeasureError::NoCells { points: mesh.points().len() });
+    }
+    let [shares, weights] = sums(0..of_cells.len(), &|i| {
+        let weight = found.measures[i] * found.coverage[i];
+        if of_cells[i].is_finite() { [weight * of_cells[i], weight] } else { [0.0; 2] }
+    });
+    Ok(HomogeneityReport {
+        mean: shares / weights,
+        min: super::statistics::least(&known),
+        mixed: known.iter().filter(|&&share| share < 0.9).count(),
+        histogram: Histogram::of(&known, 0.05, 20),
+        without: of_cells.len() - known.len(),
+    })
+}
+
+/// The normal equations of the linear fit, cell by cell.
+struct System<'a, const D: usize> {
+    mesh: &'a Mesh<D>,
+    /// (D + 1)² entries of A, row by row, for each cell.
+    matrices: Vec<f64>,
+    /// D + 1 entries of b for each cell.
+    rights: Vec<f64>,
+    /// Σ w and Σ w v².
+    weight: f64,
+    squares: f64,
+}
+
+/// What the fit came to.
+struct Fit {
+    /// Σ w (v − u)² / Σ w.
+    mean_square: f64,
+    iterations: usize,
+    converged: bool,
+}
+
+impl<'a, const D: usize> System<'a, D> {
+    /// Gathers the samples in each cell; `mean` is taken off their values, so that squares keep their digits.
+    fn new(mesh: &'a Mesh<D>, frame: &Frame<D>, samples: &Samples, mean: f64) -> Self {
+        let points: Vec<Point<D>> =
+            mesh.points().par_iter().map(|p| frame.world_to_lattice(Units::Samples, p)).collect();
+        let shape = frame.shape();
+        // a sample on a facet belongs to the first of its cells
+        let owners: Vec<AtomicU32> =
+            (0..frame.sample_count()).into_par_iter().map(|_| AtomicU32::new(u32::MAX)).collect();
+        let corners = mesh.corners().par_chunks_exact(D + 1).enumerate();
+        corners.clone().for_each(|(cell, corners)| {
+            each_sample(&points, corners, shape, |index, _, _| {
+                owners[index].fetch_min(cell as u32, Ordering::Relaxed);
+            });
+        });
+        let width = D + 1;
+        let mut matrices = vec![0.0; mesh.cell_count() * width * width];
+        let mut rights = vec![0.0; mesh.cell_count() * width];
+        let sums_of_cells: Vec<[f64; 2]> = corners
+            .zip(matrices.par_chunks_exact_mut(width * width))
+            .zip(rights.par_chunks_exact_mut(width))
+            .map(|(((cell, corners), matrix), right)| {
+                let mut sums = [0.0; 2];
+                each_sample(&points, corners, shape, |index, shares, weight| {
+                    let value = samples.get(index) - mean;
+                    if owners[index].load(Ordering::Relaxed) != cell as u32 || !value.is_finite() {
+                        return;
+                    }
+                    for (r, a) in shares.iter().enumerate() {
+                        for (c, b) in shares.iter().enumerate() {
+                            matrix[r * width + c] += weight * a * b;
+                        }
+                        right[r] += weight * a * value;
+                    }
+                    sums[0] += weight;
+                    sums[1] += weight * value * value;
+                });
+                sums
+            })
+            .collect();
+        let [weight, squares] = sums(0..sums_of_cells.len(), &|i| sums_of_cells[i]);
+        Self { mesh, matrices, rights, weight, squares }
+    }
+
+    /// A u.
+    fn product(&self, u: &[f64]) -> Vec<f64> {
+        let mut out = vec![0.0; u.len()];
+        let width = D + 1;
+        for (cell, matrix) in self.mesh.cells().zip(self.matrices.chunks_exact(width * width)) {
+            for (row, &r) in matrix.chunks_exact(width).zip(cell) {
+                out[r as usize] +=
+                    row.iter().zip(cell).map(|(a, &c)| a * u[c as usize]).sum::<f64>();
+            }
+        }
+        out
+    }
+
+    /// The right side, and the diagonal of A, 1 where a point has no samples about it.
+    fn right_and_diagonal(&self) -> (Vec<f64>, Vec<f64>) {
+        let count = self.mesh.points().len();
+        let (mut right, mut diagonal) = (vec![0.0; count], vec![0.0; count]);
+        let width = D + 1;
+        for (i, cell) in self.mesh.cells().enumerate() {
+            for (k, &point) in cell.iter().enumerate() {
+                right[point as usize] += self.rights[i * width + k];
+                diagonal[point as usize] += self.matrices[(i * width + k) * width + k];
+            }
+        }
+        diagonal.iter_mut().filter(|a| **a == 0.0).for_each(|a| *a = 1.0);
+        (right, diagonal)
+    }
+
+    /// The least squares by conjugate gradients.
+    fn solve(&self, watch: &mut dyn Watch) -> Result<Fit, MeasureError> {
+        let (right, diagonal) = self.right_and_diagonal();
+        let inner = |a: &[f64], b: &[f64]| sum(0..a.len(), &|i| a[i] * b[i]);
+        let mut u = vec![0.0; right.len()];
+        let mut residual = right.clone();
+        let scaled =
+            |r: &[f64]| -> Vec<f64> { r.iter().zip(&diagonal).map(|(r, d)| r / d).collect() };
+        let mut direction = scaled(&residual);
+        let mut size = inner(&residual, &direction);
+        let (first, mut iterations) = (size, 0);
+        while size > ENOUGH * ENOUGH * first && iterations < MOST_ITERATIONS {
+            check(watch, Phase::Measure, 0.7 + 0.3 * (iterations as f64 / 200.0), None)?;
+            let image = self.product(&direction);
+            let curvature = inner(&direction, &image);
+            if curvature.is_nan() || curvature <= 0.0 {
+                break;
+            }
+            let step = size / curvature;
+            for i in 0..u.len() {
+                u[i] += step * direction[i];
+                residual[i] -= step * image[i];
+            }
+            let z = scaled(&residual);
+            let next = inner(&residual, &z);
+            let share = next / size;
+            direction.iter_mut().zip(&z).for_each(|(d, z)| *d = z + share * *d);
+            size = next;
+            iterations += 1;
+        }
+        // v·v − 2 b·u + u·A u, with A u = b − residual
+        let fitted = sum(0..u.len(), &|i| u[i] * (right[i] + residual[i]));
+        Ok(Fit {
+            mean_square: (self.squares - fitted) / self.weight,
+            iterations,
+            converged: size <= ENOUGH * ENOUGH * first,
+        })
+    }
+}
+
+/// Calls `visit` with the index, the D + 1 barycentric coordinates and the box of each sample in a cell.
+fn each_sample<const D: usize>(
+    points: &[Point<D>],
+    corners: &[u32],
+    shape: [usize; D],
+    mut visit: impl FnMut(usize, &[f64], f64),
+) {
+    let first = points[corners[0] as usize];
+    let edges: [Point<D>; D] =
+        std::array::from_fn(|k| difference(&points[corners[k + 1] as usize], &first));
+    let Some((inverse, _)) = invert(&edges) else { return };
+    let (mut low, mut counts) = ([0; D], [0; D]);
+    for k in 0..D {
+        let ends = corners.iter().map(|&c| points[c as usize][k]);
+        let (min, max) =
+            ends.fold((f64::INFINITY, f64::NEG_INFINITY), |(a, b), x| (a.min(x), b.max(x)));
+        let last = (shape[k] - 1) as f64;
+        if max < -SLACK || min > last + SLACK {
+            return;
+        }
+        low[k] = (min - SLACK).ceil().max(0.0) as usize;
+        let high = (max + SLACK).floor().min(last) as usize;
+        counts[k] = (high + 1).saturating_sub(low[k]);
+    }
+    let mut shares = [0.0; 5]; // D + 1 of them, D at most 4
+    for code in 0..counts.iter().product() {
+        let (mut rest, mut index, mut stride, mut weight) = (code, 0, 1, 1.0);
+        let mut offset = [0.0; D];
+        for k in 0..D {
+            let at = low[k] + rest % counts[k];
+            rest /= counts[k];
+            index += at * stride;
+            stride *= shape[k];
+            weight *= if at == 0 || at + 1 == shape[k] { 0.5 } else { 1.0 };
+            offset[k] = at as f64 - first[k];
+        }
+        let mut left = 1.0;
+        for k in 0..D {
+            // column k of the inverse is the gradient of the barycentric coordinate of corner k + 1
+            shares[k + 1] = (0..D).map(|r| offset[r] * inverse[r][k]).sum();
+            left -= shares[k + 1];
+        }
+        shares[0] = left;
+        if shares[..=D].iter().all(|&share| share >= -SLACK) {
+            visit(index, &shares[..=D], weight);
+        }
+    }
+}
