@@ -82,8 +82,17 @@ fn field(count: usize, scale: f64) -> Vec<f32> {
     (0..count).map(|i| (noise(i) * scale) as f32).collect()
 }
 
+/// Numbers that need double precision.
+fn totals(count: usize) -> Vec<f64> {
+    (0..count).map(|i| 16_777_217.0 + noise(i)).collect()
+}
+
 fn assert_same<const D: usize>(loaded: &LoadedMesh<D>, mesh: &Mesh<D>, fields: &[(&str, &[f32])]) {
     assert_eq!(&loaded.mesh, mesh);
+    let quality: Vec<f64> = field(mesh.cell_count(), 1.0).into_iter().map(f64::from).collect();
+    assert_eq!(loaded.cell_field("quality"), Some(quality.as_slice()));
+    assert_eq!(loaded.cell_field("total"), Some(totals(mesh.cell_count()).as_slice()));
+    assert_eq!(loaded.cell_fields.len(), 2);
     let found: Vec<_> =
         loaded.point_fields.iter().map(|f| (f.name.as_str(), f.values.as_slice())).collect();
     assert_eq!(found, fields);
@@ -97,12 +106,13 @@ fn round_trip<const D: usize>(count: usize, check: impl Fn(AnyMesh, &Mesh<D>, &[
     let mesh = fan::<D>(count);
     let distance = field(mesh.points().len(), 10.0);
     let potential = field(mesh.points().len(), 1e-7);
-    let quality = field(mesh.cell_count(), 1.0);
+    let (quality, total) = (field(mesh.cell_count(), 1.0), totals(mesh.cell_count()));
     let (provenance, frame) = (provenance(), frame());
     let data = MeshData::new(&mesh)
         .with_point_field("distance", &distance)
         .and_then(|d| d.with_point_field("potential", &potential))
         .and_then(|d| d.with_cell_field("quality", &quality))
+        .and_then(|d| d.with_cell_field("total", &total))
         .unwrap()
         .with_frame(&frame)
         .with_provenance(&provenance);

@@ -21,6 +21,7 @@ pub mod optimize;
 pub mod improve;
 pub mod edit;
 pub mod features;
+pub mod sample;
 pub mod measure;
 pub mod pipeline;
 

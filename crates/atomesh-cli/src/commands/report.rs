@@ -114,7 +114,7 @@ fn measure<const D: usize>(
         let message = "the mesh has no field `distance`; expected --size D";
         return Err(Failure::misuse(message).about(&args.mesh));
     };
-    let report = MeshReport::new(&mesh, &frame.grid(units), &samples, size, watch);
+    let report = MeshReport::new(&mesh, &frame.grid(units), &samples, size.into(), watch);
     report.map_err(super::measure_failure).map_err(about(&args.mesh))
 }
 

@@ -5,6 +5,8 @@ use std::ops::Range;
 
 use atomesh::mesh::Mesh;
 
+use super::data::Values;
+
 /// The order of the bytes in a number.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(crate) enum Endian {
@@ -96,6 +98,14 @@ impl<'a> Column<'a> {
     /// The numbers of a slice.
     pub fn slice<T: Number>(values: &'a [T], endian: Endian) -> Self {
         Self::numbers(values.len(), endian, |i| values[i])
+    }
+
+    /// The numbers of a field.
+    pub fn values(values: Values<'a>, endian: Endian) -> Self {
+        match values {
+            Values::Single(values) => Self::slice(values, endian),
+            Values::Double(values) => Self::slice(values, endian),
+        }
     }
 
     /// The points of a mesh as x, y, z; z is 0 in a flat mesh.

@@ -42,11 +42,63 @@ pub struct Provenance {
     pub seed: u64,
 }
 
+/// The numbers of a field, in the precision in which files keep them.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub enum Values<'a> {
+    /// Single precision: enough for what was measured.
+    Single(&'a [f32]),
+    /// Double precision: for sums, and for labels above 2²⁴.
+    Double(&'a [f64]),
+}
+
+impl Values<'_> {
+    /// How many numbers there are.
+    pub fn len(&self) -> usize {
+        match self {
+            Self::Single(values) => values.len(),
+            Self::Double(values) => values.len(),
+        }
+    }
+
+    /// Whether there are none.
+    pub fn is_empty(&self) -> bool {
+        self.len() == 0
+    }
+
+    /// Number `i`.
+    ///
+    /// # Panics
+    /// If there is none.
+    pub fn get(&self, i: usize) -> f64 {
+        match self {
+            Self::Single(values) => values[i].into(),
+            Self::Double(values) => values[i],
+        }
+    }
+}
+
+macro_rules! values {
+    ($($kind:ident of $number:ty),*) => {$(
+        impl<'a> From<&'a [$number]> for Values<'a> {
+            fn from(values: &'a [$number]) -> Self {
+                Self::$kind(values)
+            }
+        }
+
+        impl<'a> From<&'a Vec<$number>> for Values<'a> {
+            fn from(values: &'a Vec<$number>) -> Self {
+                Self::$kind(values)
+            }
+        }
+    )*};
+}
+values!(Single of f32, Double of f64);
+
 /// A named value for each point, or each cell.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Field<'a> {
     name: &'a str,
-    values: &'a [f32],
+    values: Values<'a>,
 }
 
 impl<'a> Field<'a> {
@@ -56,7 +108,7 @@ impl<'a> Field<'a> {
     }
 
     /// The values, one for each point or cell.
-    pub fn values(&self) -> &'a [f32] {
+    pub fn values(&self) -> Values<'a> {
         self.values
     }
 }
@@ -95,7 +147,8 @@ impl<'a, const D: usize> MeshData<'a, D> {
         name: &'a str,
         values: &'a [f32],
     ) -> Result<Self, MeshDataError> {
-        let field = checked(&self.point_fields, name, values, self.mesh.points().len())?;
+        let count = self.mesh.points().len();
+        let field = checked(&self.point_fields, name, values.into(), count)?;
         self.point_fields.push(field);
         Ok(self)
     }
@@ -107,9 +160,10 @@ impl<'a, const D: usize> MeshData<'a, D> {
     pub fn with_cell_field(
         mut self,
         name: &'a str,
-        values: &'a [f32],
+        values: impl Into<Values<'a>>,
     ) -> Result<Self, MeshDataError> {
-        let field = checked(&self.cell_fields, name, values, self.mesh.cell_count())?;
+        let (values, count) = (values.into(), self.mesh.cell_count());
+        let field = checked(&self.cell_fields, name, values, count)?;
         self.cell_fields.push(field);
         Ok(self)
     }
@@ -168,7 +222,7 @@ impl<'a, const D: usize> MeshData<'a, D> {
 fn checked<'a>(
     others: &[Field<'_>],
     name: &'a str,
-    values: &'a [f32],
+    values: Values<'a>,
     expected: usize,
 ) -> Result<Field<'a>, MeshDataError> {
     let plain = |c: u8| c.is_ascii_alphanumeric() || b"_-".contains(&c);
@@ -186,13 +240,13 @@ fn checked<'a>(
     Ok(Field { name, values })
 }
 
-/// A named value for each point, as read from a file.
+/// A named value for each point, or each cell, as read from a file.
 #[derive(Clone, Debug, PartialEq)]
-pub struct OwnedField {
+pub struct OwnedField<T = f32> {
     /// The name in the file.
     pub name: String,
-    /// One value for each point.
-    pub values: Vec<f32>,
+    /// One value for each point or cell.
+    pub values: Vec<T>,
 }
 
 /// A mesh as read from a file.
@@ -204,6 +258,9 @@ pub struct LoadedMesh<const D: usize> {
     pub point_fields: Vec<OwnedField>,
     /// The groups of facets and cells, as far as the format holds them and they are the mesh's.
     pub tags: Tags<D>,
+    /// The scalar fields in the cells, in the file's order, for the cells that are kept; in double precision,
+    /// since labels and sums need it.
+    pub cell_fields: Vec<OwnedField<f64>>,
     /// The frame of the image that the mesh follows, if atomesh wrote the file.
     pub frame: Option<Frame<D>>,
     /// The provenance, if atomesh wrote the file.
@@ -217,6 +274,11 @@ impl<const D: usize> LoadedMesh<D> {
     /// The values of the field of that name.
     pub fn point_field(&self, name: &str) -> Option<&[f32]> {
         self.point_fields.iter().find(|f| f.name == name).map(|f| f.values.as_slice())
+    }
+
+    /// The values in the cells of the field of that name.
+    pub fn cell_field(&self, name: &str) -> Option<&[f64]> {
+        self.cell_fields.iter().find(|f| f.name == name).map(|f| f.values.as_slice())
     }
 }
 

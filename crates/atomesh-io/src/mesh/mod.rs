@@ -1,7 +1,7 @@
 //! Mesh files, written and read: VTU, VTK legacy, Gmsh MSH 4.1 and 2.2, NPZ, Abaqus INP, OpenFOAM polyMesh.
 //!
 //! Every format holds the points in world coordinates as f64, the cells in the mesh's order, the
-//! fields at the points (not INP and polyMesh), and, as JSON, the image's frame and the mesh's
+//! fields at the points and in the cells (not INP and polyMesh), and, as JSON, the image's frame and the mesh's
 //! [`Provenance`]; all but VTK legacy and NPZ hold its tags. The same
 //! [`MeshData`] makes the same bytes, at any number of threads.
 
@@ -22,7 +22,9 @@ use std::path::{Path, PathBuf};
 
 use atomesh::watch::{Cancelled, Watch};
 
-pub use data::{AnyMesh, Field, LoadedMesh, MeshData, MeshDataError, OwnedField, Provenance};
+pub use data::{
+    AnyMesh, Field, LoadedMesh, MeshData, MeshDataError, OwnedField, Provenance, Values,
+};
 pub use read::MeshReadError;
 
 use crate::atomic_file::AtomicFile;

@@ -86,15 +86,64 @@ pub(super) struct Parts {
     pub triangles: Vec<u32>,
     pub tetrahedra: Vec<u32>,
     pub skipped_cells: usize,
+    /// The corners of each cell of the file that is kept, 0 for the others, in the file's order.
+    pub cell_kinds: Vec<u8>,
     pub fields: Vec<OwnedField>,
+    /// A value for each cell of the file.
+    pub cell_fields: Vec<OwnedField<f64>>,
     pub metadata: Metadata,
     pub tags: RawTags,
 }
 
 impl Parts {
+    /// Keeps a cell whose corners are known.
+    pub fn add_triangle(&mut self, corners: &[u32]) {
+        self.triangles.extend_from_slice(corners);
+        self.cell_kinds.push(3);
+    }
+
+    /// Keeps a cell whose corners are known.
+    pub fn add_tetrahedron(&mut self, corners: &[u32]) {
+        self.tetrahedra.extend_from_slice(corners);
+        self.cell_kinds.push(4);
+    }
+
+    /// Leaves a cell out.
+    pub fn skip_cell(&mut self) {
+        self.skipped_cells += 1;
+        self.cell_kinds.push(0);
+    }
+
+    /// The fields of the cells with so many corners; fields of another number of cells are dropped.
+    fn fields_of(&mut self, corners: u8) -> Vec<OwnedField<f64>> {
+        let kinds = &self.cell_kinds;
+        let mut fields = std::mem::take(&mut self.cell_fields);
+        fields.retain_mut(|field| {
+            let whole = field.values.len() == kinds.len();
+            let mut kinds = kinds.iter();
+            field.values.retain(|_| kinds.next() == Some(&corners));
+            whole
+        });
+        fields
+    }
+
+    /// Puts the values of the cells with so many corners in an order of these cells, if there is one.
+    pub fn sort_fields(&mut self, corners: u8, order: &[usize]) {
+        if order.is_empty() {
+            return;
+        }
+        let kinds = self.cell_kinds.iter().enumerate();
+        let places: Vec<usize> = kinds.filter(|(_, k)| **k == corners).map(|(i, _)| i).collect();
+        for field in &mut self.cell_fields {
+            let values: Vec<f64> = order.iter().map(|&cell| field.values[places[cell]]).collect();
+            places.iter().zip(values).for_each(|(&place, value)| field.values[place] = value);
+        }
+    }
+
     /// A mesh of the tetrahedra, if there are any, or else of the triangles.
     pub fn into_mesh(mut self) -> Result<AnyMesh, MeshReadError> {
         if !self.tetrahedra.is_empty() {
+            let cell_fields = self.fields_of(4);
             let mesh = Mesh::new(self.points, self.tetrahedra)?;
             let facets = std::mem::take(&mut self.tags.triangles);
             let regions = std::mem::take(&mut self.tags.tetrahedron_regions);
@@ -102,7 +151,7 @@ impl Parts {
             let (tags, left_out) = self.tags.into_tags(&mesh, facets, regions)?;
             let skipped = self.skipped_cells + untagged + left_out;
             let loaded = loaded(mesh, self.fields, &self.metadata, skipped);
-            return Ok(AnyMesh::Volume(LoadedMesh { tags, ..loaded }));
+            return Ok(AnyMesh::Volume(LoadedMesh { tags, cell_fields, ..loaded }));
         }
         if self.triangles.is_empty() {
             return Err(MeshReadError::NoCells { skipped: self.skipped_cells });
@@ -116,6 +165,7 @@ impl Parts {
         if max - min > 1e-9 * size {
             return Err(MeshReadError::NotFlat { min, max });
         }
+        let cell_fields = self.fields_of(3);
         let points = self.points.into_iter().map(|[x, y, _]| [x, y]).collect();
         let mesh = Mesh::new(points, self.triangles)?;
         let facets = std::mem::take(&mut self.tags.edges);
@@ -123,7 +173,7 @@ impl Parts {
         let (tags, left_out) = self.tags.into_tags(&mesh, facets, regions)?;
         let skipped = self.skipped_cells + left_out;
         let loaded = loaded(mesh, self.fields, &self.metadata, skipped);
-        Ok(AnyMesh::Flat(LoadedMesh { tags, ..loaded }))
+        Ok(AnyMesh::Flat(LoadedMesh { tags, cell_fields, ..loaded }))
     }
 }
 
@@ -135,5 +185,6 @@ pub(super) fn loaded<const D: usize>(
     skipped_cells: usize,
 ) -> LoadedMesh<D> {
     let (frame, provenance) = (metadata.frame(), metadata.provenance());
-    LoadedMesh { mesh, point_fields, tags: Tags::default(), frame, provenance, skipped_cells }
+    let (cell_fields, tags) = (vec![], Tags::default());
+    LoadedMesh { mesh, point_fields, cell_fields, tags, frame, provenance, skipped_cells }
 }

@@ -1,7 +1,7 @@
 //! Reading MSH 4.1 and 2.2, binary (either byte order) and text.
 //!
 //! Points are named by tags, which need not be 1, 2, 3 ...; they keep the file's order. Sections that
-//! hold no points, cells or values at points are passed over.
+//! hold no points, cells or values at points or in cells are passed over.
 
 use std::collections::HashMap;
 use std::str::FromStr;
@@ -23,6 +23,7 @@ pub fn read_msh(bytes: &[u8]) -> Result<AnyMesh, MeshReadError> {
         version: MshVersion::V41,
         wide: true,
         index_of: Tags::default(),
+        cell_of: Tags::default(),
         parts: Parts::default(),
         physicals: HashMap::new(),
         cell_tags: [Vec::new(), Vec::new()],
@@ -34,7 +35,8 @@ pub fn read_msh(bytes: &[u8]) -> Result<AnyMesh, MeshReadError> {
             "Entities" if reader.version == MshVersion::V41 => reader.entities()?,
             "Nodes" => reader.nodes()?,
             "Elements" => reader.elements()?,
-            "NodeData" => reader.node_data()?,
+            "NodeData" => reader.field(false)?,
+            "ElementData" => reader.field(true)?,
             "Comments" => reader.comments(),
             _ => {}
         }
@@ -131,10 +133,10 @@ impl<'a> Numbers<'a> {
     }
 }
 
-/// Which point a tag names.
+/// Which point or cell a tag names.
 #[derive(Default)]
 struct Tags {
-    /// Whether tag t names point t − 1, as in most files.
+    /// The tag of each; in most files tag t names point t − 1.
     tags: Vec<u64>,
     map: HashMap<u64, u32>,
 }
@@ -167,6 +169,8 @@ struct Reader<'a> {
     /// Whether sizes have 8 bytes, not 4 (binary 4.1).
     wide: bool,
     index_of: Tags,
+    /// Which cell of the file a tag names.
+    cell_of: Tags,
     parts: Parts,
     /// The physical groups of entities, by dimension and tag (4.1).
     physicals: HashMap<(i32, i32), Vec<i32>>,
@@ -351,17 +355,23 @@ impl Reader<'_> {
         if parts.metadata.is_ours() {
             let [triangles, tetrahedra] = &self.cell_tags;
             if parts.tetrahedra.is_empty() {
-                sort_cells::<3>(triangles, &mut parts.triangles, &mut parts.tags.triangle_regions);
+                let order = order_of(triangles);
+                sort_cells::<3>(&order, &mut parts.triangles, &mut parts.tags.triangle_regions);
+                parts.sort_fields(3, &order);
             }
-            sort_cells::<4>(tetrahedra, &mut parts.tetrahedra, &mut parts.tags.tetrahedron_regions);
+            let order = order_of(tetrahedra);
+            sort_cells::<4>(&order, &mut parts.tetrahedra, &mut parts.tags.tetrahedron_regions);
+            parts.sort_fields(4, &order);
         }
     }
 
     fn elements(&mut self) -> Result<(), MeshReadError> {
         match self.version {
-            MshVersion::V41 => self.elements_41(),
-            MshVersion::V22 => self.elements_22(),
+            MshVersion::V41 => self.elements_41()?,
+            MshVersion::V22 => self.elements_22()?,
         }
+        self.cell_of.close();
+        Ok(())
     }
 
     fn elements_41(&mut self) -> Result<(), MeshReadError> {
@@ -376,6 +386,7 @@ impl Reader<'_> {
             let corners = self.corner_count(kind)?;
             for _ in 0..self.count("cells")? {
                 let tag = self.size()?;
+                self.cell_of.push(tag);
                 self.cell((kind, tag), corners, &physicals, Self::size)?;
             }
         }
@@ -408,7 +419,9 @@ impl Reader<'_> {
                     }
                 }
                 let physicals = &physical[..usize::from(physical[0] != 0)];
-                self.cell((kind, self.tag(tag)?), corners, physicals, |reader| {
+                let tag = self.tag(tag)?;
+                self.cell_of.push(tag);
+                self.cell((kind, tag), corners, physicals, |reader| {
                     let tag = reader.from.int()?;
                     reader.tag(tag)
                 })?;
@@ -450,26 +463,29 @@ impl Reader<'_> {
         let tags = &mut self.parts.tags;
         tags.has_regions |= region != 0 && kind != 1;
         match kind {
-            1 if region != 0 => tags.edges.extend(physicals.iter().map(|&id| ([a, b], id))),
+            1 if region != 0 => {
+                self.parts.cell_kinds.push(0);
+                tags.edges.extend(physicals.iter().map(|&id| ([a, b], id)));
+            }
             2 => {
-                self.parts.triangles.extend_from_slice(&cell[..3]);
-                self.cell_tags[0].push(tag);
                 tags.triangle_regions.push(region);
                 tags.facet_cells += usize::from(region != 0);
                 tags.triangles.extend(physicals.iter().map(|&id| ([a, b, c], id)));
+                self.cell_tags[0].push(tag);
+                self.parts.add_triangle(&cell[..3]);
             }
             4 => {
-                self.parts.tetrahedra.extend_from_slice(&cell);
-                self.cell_tags[1].push(tag);
                 tags.tetrahedron_regions.push(region);
+                self.cell_tags[1].push(tag);
+                self.parts.add_tetrahedron(&cell);
             }
-            _ => self.parts.skipped_cells += 1,
+            _ => self.parts.skip_cell(),
         }
         Ok(())
     }
 
-    /// Keeps a scalar field that has a value for every point.
-    fn node_data(&mut self) -> Result<(), MeshReadError> {
+    /// Keeps a scalar field that has a value for every point, or for every cell or all of one kind.
+    fn field(&mut self, of_cells: bool) -> Result<(), MeshReadError> {
         let mut name = "";
         for i in 0..self.text_count("strings")? {
             let line = self.from.line()?;
@@ -490,32 +506,53 @@ impl Reader<'_> {
             return Err(self.from.expected("three integers before this"));
         };
         let count = self.from.bounded(count, "values")?;
-        let keep = components == 1 && count == self.parts.points.len() && !name.is_empty();
-        let mut values = vec![f32::NAN; if keep { count } else { 0 }];
+        let (tags, all) = match of_cells {
+            true => (&self.cell_of, self.parts.cell_kinds.len()),
+            false => (&self.index_of, self.parts.points.len()),
+        };
+        let triangles = self.parts.triangles.len() / 3;
+        let kept = [all, triangles, self.parts.tetrahedra.len() / 4];
+        let whole = if of_cells { kept.contains(&count) } else { count == all };
+        let keep = components == 1 && whole && !name.is_empty();
+        let mut values = vec![f64::NAN; if keep { all } else { 0 }];
         for _ in 0..count {
             let tag = self.from.int()?;
-            let index = self.index_of.index(self.tag(tag)?);
+            let tag = u64::try_from(tag)
+                .map_err(|_| malformed(self.from.at, "a tag of 0 or more", tag.to_string()))?;
+            let index = tags.index(tag);
             for _ in 0..components {
                 let value = self.from.real()?;
                 if let Some(slot) = index.and_then(|i| values.get_mut(i as usize)) {
-                    *slot = value as f32;
+                    *slot = value;
                 }
             }
         }
-        if keep {
-            self.parts.fields.push(OwnedField { name: name.into(), values });
+        let name = name.into();
+        if keep && of_cells {
+            self.parts.cell_fields.push(OwnedField { name, values });
+        } else if keep {
+            let values = values.into_iter().map(|v| v as f32).collect();
+            self.parts.fields.push(OwnedField { name, values });
         }
         Ok(())
     }
 }
 
-/// Puts cells of `N` corners, with their regions, in the order of their tags.
-fn sort_cells<const N: usize>(tags: &[u64], corners: &mut Vec<u32>, regions: &mut Vec<i32>) {
+/// The cells in the order of their tags; none if they are in order.
+fn order_of(tags: &[u64]) -> Vec<usize> {
     if tags.is_sorted() {
-        return;
+        return Vec::new();
     }
     let mut order: Vec<usize> = (0..tags.len()).collect();
     order.sort_by_key(|&cell| tags[cell]);
+    order
+}
+
+/// Puts cells of `N` corners, with their regions, in an order, if there is one.
+fn sort_cells<const N: usize>(order: &[usize], corners: &mut Vec<u32>, regions: &mut Vec<i32>) {
+    if order.is_empty() {
+        return;
+    }
     *corners = order.iter().flat_map(|&cell| &corners[cell * N..(cell + 1) * N]).copied().collect();
     *regions = order.iter().map(|&cell| regions[cell]).collect();
 }

@@ -349,9 +349,9 @@ fn field_data<W: Write>(
     let (name, count) = (field.name(), field.values().len());
     // one string: the name; one real: the time; three integers: time step, components, values
     to.text(&format!("${section}\n1\n\"{name}\"\n1\n0\n3\n0\n1\n{count}\n"));
-    for (i, &value) in field.values().iter().enumerate() {
+    for i in 0..count {
         to.int(i + 1);
-        to.real(value.into());
+        to.real(field.values().get(i));
         to.item()?;
     }
     to.end(section);

@@ -12,8 +12,8 @@ use super::super::metadata::Metadata;
 use super::super::read::{MeshReadError, loaded, malformed};
 
 /// Reads the mesh of an NPZ archive with the arrays `points` (n × 2 or n × 3, reals) and `cells`
-/// (m × 3 or m × 4, integers). Other arrays of n reals are fields at the points, those named `cell.…`
-/// are passed over.
+/// (m × 3 or m × 4, integers). Other arrays of n reals are fields at the points; arrays
+/// named `cell.NAME`, of m numbers, are fields in the cells.
 ///
 /// # Errors
 /// [`MeshReadError`] if the bytes are not such an archive.
@@ -88,19 +88,27 @@ impl<'a> Archive<'a> {
         }
         let mesh = Mesh::new(points, corners)?;
         let names: Vec<String> = self.zip.file_names().map(str::to_owned).collect();
-        let mut fields = Vec::new();
+        let (mut fields, mut cell_fields) = (Vec::new(), Vec::new());
         for name in names.iter().filter_map(|n| n.strip_suffix(".npy")) {
-            if ["points", "cells", "metadata"].contains(&name) || name.starts_with("cell.") {
+            if ["points", "cells", "metadata"].contains(&name) {
                 continue;
             }
             let Some(array) = self.array(name)? else { continue };
-            if array.shape == [mesh.points().len() as u64] {
+            if let Some(name) = name.strip_prefix("cell.") {
+                if array.shape == [mesh.cell_count() as u64]
+                    && let Some(values) = array.numbers()
+                {
+                    cell_fields.push(OwnedField { name: name.into(), values: values? });
+                }
+            } else if array.shape == [mesh.points().len() as u64] {
                 let values = array.reals()?.into_iter().map(|v| v as f32).collect();
                 fields.push(OwnedField { name: array.name, values });
             }
         }
         let metadata = self.metadata()?;
-        Ok(loaded(mesh, fields, &metadata, 0))
+        let mut loaded = loaded(mesh, fields, &metadata, 0);
+        loaded.cell_fields = cell_fields;
+        Ok(loaded)
     }
 
     fn metadata(&mut self) -> Result<Metadata, MeshReadError> {
@@ -115,6 +123,16 @@ impl Array {
         self.values::<f64, _>(Some)
             .or_else(|| self.values::<f32, _>(|v| Some(v.into())))
             .unwrap_or_else(|| Err(self.wrong("float64 or float32")))
+    }
+
+    /// Reals or integers; `None` if they are of another type.
+    fn numbers(&self) -> Option<Result<Vec<f64>, MeshReadError>> {
+        self.values::<f64, _>(Some)
+            .or_else(|| self.values::<f32, _>(|v| Some(v.into())))
+            .or_else(|| self.values::<i32, _>(|v| Some(v.into())))
+            .or_else(|| self.values::<u32, _>(|v| Some(v.into())))
+            .or_else(|| self.values::<i64, _>(|v| Some(v as f64)))
+            .or_else(|| self.values::<u8, _>(|v| Some(v.into())))
     }
 
     fn indices(&self) -> Result<Vec<u32>, MeshReadError> {

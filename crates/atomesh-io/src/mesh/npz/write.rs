@@ -7,7 +7,7 @@ use zip::write::SimpleFileOptions;
 use zip::{CompressionMethod, DateTime, ZipWriter};
 
 use super::super::column::{Column, Endian};
-use super::super::data::MeshData;
+use super::super::data::{Field, MeshData, Values};
 use super::super::{MeshWriteError, metadata};
 
 /// Writes a mesh as NPZ.
@@ -28,13 +28,13 @@ pub fn write_npz<const D: usize>(
         Array::new("cells", "<u4", &[cells, D + 1], Column::slice(mesh.corners(), little)),
     ];
     for field in data.point_fields() {
-        let column = Column::slice(field.values(), little);
-        arrays.push(Array::new(field.name(), "<f4", &[points.len()], column));
+        let column = Column::values(field.values(), little);
+        arrays.push(Array::new(field.name(), kind(field), &[points.len()], column));
     }
     for field in data.cell_fields() {
         let (name, column) =
-            (format!("cell.{}", field.name()), Column::slice(field.values(), little));
-        arrays.push(Array::new(&name, "<f4", &[cells], column));
+            (format!("cell.{}", field.name()), Column::values(field.values(), little));
+        arrays.push(Array::new(&name, kind(field), &[cells], column));
     }
     let bytes = Column::slice(text.as_bytes(), little);
     arrays.push(Array::new("metadata", &format!("|S{}", text.len()), &[], bytes));
@@ -47,6 +47,14 @@ pub fn write_npz<const D: usize>(
     }
     zip.finish().map_err(std::io::Error::from)?;
     Ok(())
+}
+
+/// NumPy's name of the type of a field's numbers.
+fn kind(field: &Field) -> &'static str {
+    match field.values() {
+        Values::Single(_) => "<f4",
+        Values::Double(_) => "<f8",
+    }
 }
 
 /// One array of the archive.

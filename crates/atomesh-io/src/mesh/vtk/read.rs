@@ -177,10 +177,16 @@ impl<'a> Reader<'a> {
     }
 
     fn keep(&self, parts: &mut Parts, name: &str, components: usize, values: Vec<f64>) {
-        if components == 1 && matches!(self.values_at, Some(Values::Points(n)) if n == values.len())
-        {
-            let values = values.into_iter().map(|v| v as f32).collect();
-            parts.fields.push(OwnedField { name: name.into(), values });
+        let name = name.into();
+        match self.values_at {
+            Some(Values::Points(n)) if components == 1 && n == values.len() => {
+                let values = values.into_iter().map(|v| v as f32).collect();
+                parts.fields.push(OwnedField { name, values });
+            }
+            Some(Values::Cells(n)) if components == 1 && n == values.len() => {
+                parts.cell_fields.push(OwnedField { name, values });
+            }
+            _ => {}
         }
     }
 
@@ -311,21 +317,21 @@ impl Cells {
                 malformed(0, format!("growing offsets at cell {cell}"), end.to_string())
             })?;
             start = end;
-            let target = match (kind as u8, list.len()) {
-                (5, 3) => &mut parts.triangles,
-                (10, 4) => &mut parts.tetrahedra,
-                _ => {
-                    parts.skipped_cells += 1;
-                    continue;
-                }
-            };
-            for &corner in list {
-                let index = corner as u32;
-                if f64::from(index) != corner {
+            if !matches!((kind as u8, list.len()), (5, 3) | (10, 4)) {
+                parts.skip_cell();
+                continue;
+            }
+            let mut corners = [0; 4];
+            for (index, &corner) in corners.iter_mut().zip(list) {
+                *index = corner as u32;
+                if f64::from(*index) != corner {
                     let expected = format!("an index below 2^32 in cell {cell}");
                     return Err(malformed(0, expected, corner.to_string()));
                 }
-                target.push(index);
+            }
+            match list.len() {
+                3 => parts.add_triangle(&corners[..3]),
+                _ => parts.add_tetrahedron(&corners),
             }
         }
         Ok(())

@@ -5,10 +5,10 @@ use std::io::Write;
 use atomesh::watch::{Phase, Watch, check};
 
 use super::super::column::{Column, Endian};
-use super::super::data::{Field, MeshData};
+use super::super::data::{Field, MeshData, Values};
 use super::super::{MeshWriteError, metadata, vtu};
 
-/// Writes a mesh as a legacy VTK file: big-endian binary, points as double, fields as float; the frame
+/// Writes a mesh as a legacy VTK file: big-endian binary, points as double, fields as float, or double if they came so; the frame
 /// and the provenance are JSON in the field data.
 ///
 /// # Errors
@@ -62,8 +62,12 @@ fn fields(out: &mut impl Write, fields: &[Field]) -> Result<(), MeshWriteError> 
     }
     writeln!(out, "FIELD FieldData {}", fields.len())?;
     for field in fields {
-        writeln!(out, "{} 1 {} float", field.name(), field.values().len())?;
-        Column::slice(field.values(), Endian::Big).write(out)?;
+        let kind = match field.values() {
+            Values::Single(_) => "float",
+            Values::Double(_) => "double",
+        };
+        writeln!(out, "{} 1 {} {kind}", field.name(), field.values().len())?;
+        Column::values(field.values(), Endian::Big).write(out)?;
         writeln!(out)?;
     }
     Ok(())

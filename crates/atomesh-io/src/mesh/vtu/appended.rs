@@ -14,7 +14,7 @@ use rayon::prelude::*;
 
 use super::super::MeshWriteError;
 use super::super::column::{Column, Endian};
-use super::super::data::Field;
+use super::super::data::{Field, Values};
 
 /// Bytes of a block before compression. Large enough for zlib to do well (its window has 32 KiB),
 /// small enough for many threads.
@@ -61,10 +61,16 @@ impl<'a> Head<'a> {
 
     pub fn fields(&mut self, tag: &str, fields: &[Field<'a>]) {
         self.text(&format!("<{tag}>\n"));
-        for field in fields {
-            self.array("Float32", field.name(), "", Column::slice(field.values(), Endian::Little));
-        }
+        fields.iter().for_each(|field| self.field(field));
         self.text(&format!("</{tag}>\n"));
+    }
+
+    fn field(&mut self, field: &Field<'a>) {
+        let kind = match field.values() {
+            Values::Single(_) => "Float32",
+            Values::Double(_) => "Float64",
+        };
+        self.array(kind, field.name(), "", Column::values(field.values(), Endian::Little));
     }
 
     /// Names an array of field data, which has as many tuples as it has numbers.
@@ -76,9 +82,7 @@ impl<'a> Head<'a> {
     /// Names fields of cells, and an array of Int32.
     pub fn cell_data(&mut self, fields: &[Field<'a>], numbers: Option<(&str, Column<'a>)>) {
         self.text("<CellData>\n");
-        for field in fields {
-            self.array("Float32", field.name(), "", Column::slice(field.values(), Endian::Little));
-        }
+        fields.iter().for_each(|field| self.field(field));
         if let Some((name, column)) = numbers {
             self.array("Int32", name, "", column);
         }

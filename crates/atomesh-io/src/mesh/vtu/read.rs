@@ -237,6 +237,26 @@ fn array<'a>(
     Ok(Array { file, layout, place, kind, name, components, tuples })
 }
 
+/// Whether an array holds the region of each cell, and no field.
+fn is_region(array: &Array) -> bool {
+    array.name == "region" && array.is_integer() && array.components == 1
+}
+
+/// Appends the fields of one more piece to those of the pieces before.
+fn append<T: Clone>(fields: &mut Vec<OwnedField<T>>, more: Vec<OwnedField<T>>, first: bool) {
+    if first {
+        *fields = more;
+        return;
+    }
+    fields.retain_mut(|old| match more.iter().find(|new| new.name == old.name) {
+        Some(new) => {
+            old.values.extend_from_slice(&new.values);
+            true
+        }
+        None => false,
+    });
+}
+
 impl Piece<'_> {
     /// Appends the piece's points, cells and scalar fields; fields that not all pieces have are dropped.
     fn add_to(&self, parts: &mut Parts, first: bool) -> Result<(), MeshReadError> {
@@ -257,18 +277,23 @@ impl Piece<'_> {
             let values = array.reals(self.points)?.into_iter().map(|v| v as f32).collect();
             fields.push(OwnedField { name: array.name.into(), values });
         }
-        if first {
-            parts.fields = fields;
-        } else {
-            parts.fields.retain_mut(|old| match fields.iter().find(|new| new.name == old.name) {
-                Some(new) => {
-                    old.values.extend_from_slice(&new.values);
-                    true
-                }
-                None => false,
-            });
-        }
+        append(&mut parts.fields, fields, first);
+        append(&mut parts.cell_fields, self.cell_fields()?, first);
         Ok(())
+    }
+
+    /// The scalar fields in the cells; those of types that are not numbers are passed over.
+    fn cell_fields(&self) -> Result<Vec<OwnedField<f64>>, MeshReadError> {
+        let mut fields = Vec::new();
+        let is_field = |a: &&Array| a.components == 1 && !a.name.is_empty() && !is_region(a);
+        for array in self.cell_data.iter().filter(is_field) {
+            match array.reals(self.cells) {
+                Ok(values) => fields.push(OwnedField { name: array.name.into(), values }),
+                Err(MeshReadError::Unsupported { .. }) => {}
+                Err(e) => return Err(e),
+            }
+        }
+        Ok(fields)
     }
 
     fn add_cells(&self, parts: &mut Parts, base: u32) -> Result<(), MeshReadError> {
@@ -287,9 +312,8 @@ impl Piece<'_> {
                 malformed(self.at, expected, corner.to_string())
             })?;
         }
-        let region = self.cell_data.iter().find(|a| a.name == "region" && a.is_integer());
-        let region =
-            region.filter(|a| a.components == 1).map(|a| a.reals(self.cells)).transpose()?;
+        let region = self.cell_data.iter().find(|a| is_region(a));
+        let region = region.map(|a| a.reals(self.cells)).transpose()?;
         parts.tags.has_regions |= region.is_some();
         let region_of = |cell: usize| region.as_ref().map_or(0, |r| r[cell] as i32);
         let mut start = 0;
@@ -301,18 +325,18 @@ impl Piece<'_> {
             start = end as usize;
             match (kind, list.len()) {
                 (5, 3) => {
-                    parts.triangles.extend_from_slice(list);
+                    parts.add_triangle(list);
                     parts.tags.triangle_regions.push(region_of(cell));
                 }
                 (10, 4) => {
-                    parts.tetrahedra.extend_from_slice(list);
+                    parts.add_tetrahedron(list);
                     parts.tags.tetrahedron_regions.push(region_of(cell));
                 }
                 (5 | 10, found) => {
                     let expected = format!("3 or 4 corners of cell {cell}");
                     return Err(malformed(self.at, expected, found.to_string()));
                 }
-                _ => parts.skipped_cells += 1,
+                _ => parts.skip_cell(),
             }
         }
         Ok(())

@@ -1,10 +1,10 @@
 //! Writing VTU.
 //!
 //! Points are Float64 with z = 0 in flat meshes; indices are Int32, or Int64 where they do
-//! not fit; fields are Float32. Regions are the cell array `region`, Int32, with `region_ids` and
-//! `region_names` in the field data. There the groups of facets are too: `facets`, the corners of each;
-//! `facet_group`, the number of its group; `facet_group_ids` and `facet_group_names`. Names are text, UInt8,
-//! one a line.
+//! not fit; fields are Float32, or Float64 if they came so. Regions are the cell array `region`, Int32, with
+//! `region_ids` and `region_names` in the field data. There the groups of facets are too: `facets`, the corners
+//! of each; `facet_group`, the number of its group; `facet_group_ids` and `facet_group_names`. Names are text,
+//! UInt8, one a line.
 
 use std::io::{Seek, Write};
 
