@@ -22,6 +22,7 @@ pub mod improve;
 pub mod edit;
 pub mod features;
 pub mod sample;
+pub mod voronoi;
 pub mod measure;
 pub mod pipeline;
 
