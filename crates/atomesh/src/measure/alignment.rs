@@ -6,6 +6,7 @@ use super::nearest::{FacetTree, Near};
 use super::precision::PrecisionReport;
 use super::statistics::{percentile, sum};
 use crate::mesh::Mesh;
+use crate::voronoi::PolyMesh;
 use crate::watch::{Phase, Watch, check};
 use rand::{Rng, SeedableRng};
 use rayon::prelude::*;
@@ -77,10 +78,35 @@ pub fn alignment<const D: usize>(
         return Err(MeasureError::NoCells { points: mesh.points().len() });
     }
     check(watch, Phase::Measure, 0.0, None)?;
+    alignment_by(&FacetTree::new(mesh), features, options, watch)
+}
+
+/// Measures how well the faces of polygons or polyhedra, in sample coordinates, follow `features`; otherwise
+/// as [`alignment`].
+///
+/// # Errors
+/// [`MeasureError`] if the size is no length, or the watch ends the work.
+pub fn alignment_of_faces<const D: usize>(
+    mesh: &PolyMesh<D>,
+    features: &Features<D>,
+    options: &AlignmentOptions,
+    watch: &mut dyn Watch,
+) -> Result<AlignmentReport, MeasureError> {
+    check_size(options.size)?;
+    check(watch, Phase::Measure, 0.0, None)?;
+    let facets = (0..mesh.face_count()).flat_map(|face| mesh.parts(face)).collect();
+    alignment_by(&FacetTree::of(mesh.points(), facets), features, options, watch)
+}
+
+fn alignment_by<const D: usize>(
+    tree: &FacetTree<'_, D>,
+    features: &Features<D>,
+    options: &AlignmentOptions,
+    watch: &mut dyn Watch,
+) -> Result<AlignmentReport, MeasureError> {
     let tau = (0.1 * options.size).max(1.0);
     let near = Near { distance: tau, sine_squared: options.tangent.to_radians().sin().powi(2) };
     let picked = pick(features.positions.len(), options.limit, options.seed);
-    let tree = FacetTree::new(mesh);
     let mut found = Vec::with_capacity(picked.len());
     for block in picked.chunks(POINTS_PER_STEP) {
         check(watch, Phase::Measure, found.len() as f64 / picked.len() as f64, None)?;

@@ -19,7 +19,7 @@ mod fidelity_tests;
 #[cfg(test)]
 mod tests;
 
-pub use alignment::{AlignmentOptions, AlignmentReport, alignment};
+pub use alignment::{AlignmentOptions, AlignmentReport, alignment, alignment_of_faces};
 pub use angles::{SpreadReport, WantedSize, spread};
 pub use features::{Features, features};
 pub use fidelity::{FidelityReport, HomogeneityReport, fidelity, homogeneity};

@@ -45,8 +45,12 @@ pub(super) struct FacetTree<'a, const D: usize> {
 impl<'a, const D: usize> FacetTree<'a, D> {
     /// A tree over the facets of `mesh`. Cost: O(n log n) in facets.
     pub fn new(mesh: &'a Mesh<D>) -> Self {
-        let points = mesh.points();
-        let mut placed: Vec<Placed<D>> = faces::<D, D>(mesh)
+        Self::of(mesh.points(), faces::<D, D>(mesh))
+    }
+
+    /// A tree over facets given by their corners. Cost: O(n log n).
+    pub fn of(points: &'a [Point<D>], facets: Vec<[u32; D]>) -> Self {
+        let mut placed: Vec<Placed<D>> = facets
             .into_par_iter()
             .map(|facet| {
                 let bounds = bounds_of(&facet.map(|c| points[c as usize]));

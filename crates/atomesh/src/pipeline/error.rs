@@ -9,6 +9,7 @@ use crate::measure::MeasureError;
 use crate::mesh::ConnectError;
 use crate::optimize::OptimizeError;
 use crate::potential::PotentialError;
+use crate::voronoi::VoronoiError;
 use crate::watch::Cancelled;
 
 use super::options::LatticeKind;
@@ -79,6 +80,9 @@ pub enum PipelineError {
     /// Features could not be found among its facets.
     #[error(transparent)]
     Features(FeaturesError),
+    /// The Voronoi cells could not be made.
+    #[error(transparent)]
+    Voronoi(VoronoiError),
     /// The mesh could not be measured.
     #[error(transparent)]
     Measure(MeasureError),
@@ -99,6 +103,7 @@ impl PipelineError {
                 | Self::Connect(ConnectError::Cancelled(_))
                 | Self::Improve(ImproveError::Cancelled(_))
                 | Self::Features(FeaturesError::Cancelled(_))
+                | Self::Voronoi(VoronoiError::Cancelled(_))
                 | Self::Measure(MeasureError::Cancelled(_))
         )
     }
@@ -113,7 +118,7 @@ macro_rules! from {
         })*
     };
 }
-from!(LatticeError => Lattice, OptimizeError => Optimize, ConnectError => Connect, ImproveError => Improve, FeaturesError => Features, MeasureError => Measure);
+from!(LatticeError => Lattice, OptimizeError => Optimize, ConnectError => Connect, ImproveError => Improve, FeaturesError => Features, VoronoiError => Voronoi, MeasureError => Measure);
 
 /// What is odd but no error.
 #[derive(Clone, Debug, PartialEq, serde::Serialize, thiserror::Error)]

@@ -30,8 +30,8 @@ mod tests;
 pub use error::{PipelineError, Warning};
 pub use estimate::Estimate;
 pub use method::Method;
-pub use options::{LatticeKind, MeshOptions, Size};
-pub use outcome::{MeshReport, Outcome, sides};
+pub use options::{LatticeKind, MeshKind, MeshOptions, Size};
+pub use outcome::{MeshReport, Outcome, VoronoiReport, sides};
 
 use crate::distance::{GRADIENT_LIMIT, Grading, NominalDistance, default_distance};
 use crate::enhance::{self, FeatureOptions, Features};
@@ -42,6 +42,7 @@ use crate::lattice::{GrowOptions, Lattice, ScatterOptions, fill_holes, grow, sca
 use crate::mesh::{Mesh, merge_duplicates};
 use crate::optimize::{EngineKind, Fields, OptimizeReport, optimize};
 use crate::potential::{ImagePotential, ImageWeight, Interpolation};
+use crate::voronoi::{PolyMesh, voronoi};
 use crate::watch::{Phase, Watch, check};
 use rayon::prelude::*;
 
@@ -258,13 +259,30 @@ impl<const D: usize> Prepared<'_, D> {
         watch: &mut dyn Watch,
     ) -> Result<(Mesh<D>, Option<ImproveReport>), PipelineError> {
         let (Some(improver), false) =
-            (self.method.improver(), self.options.improve.align == Align::Off)
+            (self.method.improver(), self.options.improve.align == Align::Off || self.is_voronoi())
         else {
             return Ok((mesh, None));
         };
         let options = &self.options.improve;
         let (mesh, report) = improver.improve(mesh, freedom, self.fields(), options, watch)?;
         Ok((mesh, Some(report)))
+    }
+
+    fn is_voronoi(&self) -> bool {
+        self.options.kind == MeshKind::Voronoi
+    }
+
+    /// The cells around the atoms, if they are asked for.
+    fn cells(
+        &self,
+        mesh: &Mesh<D>,
+        watch: &mut dyn Watch,
+    ) -> Result<Option<PolyMesh<D>>, PipelineError> {
+        if !self.is_voronoi() {
+            return Ok(None);
+        }
+        let delaunay = self.method.delaunay();
+        Ok(Some(voronoi(delaunay, mesh.points(), self.grid.bounds(), watch)?))
     }
 
     /// The fields that atoms move in.
@@ -296,6 +314,7 @@ impl<const D: usize> Prepared<'_, D> {
         drop(lattice);
         let mesh = self.method.delaunay().connect(&points, watch)?;
         drop(points);
+        let cells = self.cells(&mesh, watch)?;
         let (mesh, improve_report) = self.improve(mesh, &freedom, watch)?;
         let points = mesh.points().par_iter().with_min_len(1 << 10);
         let distance = points.clone().map(|p| self.distance.at(p) as f32).collect();
@@ -304,6 +323,7 @@ impl<const D: usize> Prepared<'_, D> {
         let potential = points.map(at).collect();
         Ok(Outcome {
             mesh,
+            cells,
             distance_at_points: distance,
             potential_at_points: potential,
             potential: self.potential,

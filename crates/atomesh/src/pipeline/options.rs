@@ -57,6 +57,19 @@ impl LatticeKind {
     }
 }
 
+/// What the cells of the mesh are.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(rename_all = "kebab-case")]
+pub enum MeshKind {
+    /// Triangles or tetrahedra between the atoms.
+    #[default]
+    Delaunay,
+    /// Polygons or polyhedra around the atoms: Voronoi's, also called PEBI cells. Best with a potential that
+    /// repels ([`FeatureOptions::repel`]): the atoms line up alongside features, and faces fall on them
+    /// (Hale 2002).
+    Voronoi,
+}
+
 /// Everything a user may choose about a mesh.
 #[derive(Clone, Debug, PartialEq)]
 pub struct MeshOptions<const D: usize> {
@@ -64,6 +77,8 @@ pub struct MeshOptions<const D: usize> {
     pub features: FeatureOptions,
     /// How b is read between samples. Default [`Interpolation::for_dimension`].
     pub interpolation: Interpolation,
+    /// What the cells are. Default triangles or tetrahedra.
+    pub kind: MeshKind,
     /// The lattice space. Default physical.
     pub units: Units,
     /// The nominal distance.
@@ -90,6 +105,7 @@ impl<const D: usize> Default for MeshOptions<D> {
         Self {
             features: FeatureOptions::default(),
             interpolation: Interpolation::for_dimension(D),
+            kind: MeshKind::default(),
             units: Units::default(),
             size: Size::default(),
             image_weight: 0.45,

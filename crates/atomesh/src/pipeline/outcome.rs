@@ -7,12 +7,13 @@ use crate::image::{Frame, Grid, Samples, Units};
 use crate::improve::ImproveReport;
 use crate::measure::{
     AlignmentOptions, AlignmentReport, FACET_THRESHOLD, FidelityReport, HomogeneityReport,
-    MeasureError, ShapeReport, SpreadReport, WantedSize, alignment, features, fidelity, precision,
-    shape, spread,
+    MeasureError, ShapeReport, SpreadReport, WantedSize, alignment, alignment_of_faces, features,
+    fidelity, precision, shape, spread,
 };
 use crate::mesh::{Mesh, Tags};
 use crate::optimize::OptimizeReport;
 use crate::potential::ImagePotential;
+use crate::voronoi::{FeatureFaces, PolyMesh, PolyReport, feature_faces};
 use crate::watch::Watch;
 
 use super::error::{PipelineError, Warning};
@@ -21,6 +22,7 @@ use super::error::{PipelineError, Warning};
 #[derive(Clone, Debug)]
 pub struct Outcome<const D: usize> {
     pub(super) mesh: Mesh<D>,
+    pub(super) cells: Option<PolyMesh<D>>,
     pub(super) distance_at_points: Vec<f32>,
     pub(super) potential_at_points: Vec<f32>,
     pub(super) potential: ImagePotential<D>,
@@ -46,6 +48,21 @@ pub struct MeshReport {
     /// How pure cells are, if labels were given.
     pub homogeneity: Option<HomogeneityReport>,
 }
+
+/// The figures of a mesh of polygons or polyhedra.
+#[derive(Clone, Debug, PartialEq, serde::Serialize)]
+pub struct VoronoiReport {
+    /// Shape of the cells, in lattice space.
+    pub shape: PolyReport,
+    /// How faces follow the valleys of −|b|: features attract or repel.
+    pub alignment: AlignmentReport,
+}
+
+/// The mean of |b| from which on a face lies on a feature.
+const FEATURE: f64 = 0.2;
+
+/// Features with a smaller area of faces than so many d, or d² in 3-D, are left out.
+const LEAST_FEATURE: f64 = 2.0;
 
 impl<const D: usize> Outcome<D> {
     /// The mesh in lattice coordinates.
@@ -80,6 +97,53 @@ impl<const D: usize> Outcome<D> {
     /// The sides of the box as tags of [`Outcome::world_mesh`].
     pub fn sides(&self) -> Tags<D> {
         sides(&self.mesh, &self.potential.grid().bounds(), self.frame.is_mirrored())
+    }
+
+    /// The Voronoi cells around the mesh's points, in lattice coordinates, if they were asked for.
+    pub fn cells(&self) -> Option<&PolyMesh<D>> {
+        self.cells.as_ref()
+    }
+
+    /// The Voronoi cells in world coordinates. Where the lattice is in samples and their steps differ, the
+    /// world's cells are convex still, but their faces are not at right angles to the lines between sites.
+    pub fn world_cells(&self) -> Option<PolyMesh<D>> {
+        let to = |p: &Point<D>| self.frame.lattice_to_world(self.units, p);
+        self.cells.as_ref().map(|cells| cells.moved(self.frame.is_mirrored(), to))
+    }
+
+    /// The Voronoi cells in sample coordinates.
+    pub fn sample_cells(&self) -> Option<PolyMesh<D>> {
+        let step = self.potential.grid().step;
+        let to = |p: &Point<D>| std::array::from_fn(|k| p[k] / step[k]);
+        self.cells.as_ref().map(|cells| cells.moved(false, to))
+    }
+
+    /// The faces of the Voronoi cells that lie on features: |b| is 0.2 or more along them in the mean, in
+    /// groups of 2 d (3-D: 2 d²) or more.
+    pub fn cell_features(&self) -> Option<FeatureFaces> {
+        let least_area = LEAST_FEATURE * self.distance.mean().powi(D as i32 - 1);
+        let of = |cells| feature_faces(cells, &self.potential, FEATURE, least_area);
+        self.cells.as_ref().map(of)
+    }
+
+    /// Measures the Voronoi cells, if they were asked for.
+    ///
+    /// # Errors
+    /// [`PipelineError::Measure`], also when cancelled.
+    pub fn cells_report(
+        &self,
+        watch: &mut dyn Watch,
+    ) -> Result<Option<VoronoiReport>, PipelineError> {
+        let (Some(cells), Some(in_samples)) = (&self.cells, self.sample_cells()) else {
+            return Ok(None);
+        };
+        let grid = self.potential.grid();
+        let size = samples_of(self.distance.mean(), grid);
+        let valleys: Vec<f32> = self.potential.samples().iter().map(|b| -b.abs()).collect();
+        let found = features(&valleys, grid.shape, size, watch)?;
+        let options = AlignmentOptions::new(size);
+        let alignment = alignment_of_faces(&in_samples, &found, &options, watch)?;
+        Ok(Some(VoronoiReport { shape: PolyReport::new(cells, &grid.bounds()), alignment }))
     }
 
     /// d at the mesh's points, in lattice units.
@@ -178,8 +242,7 @@ impl MeshReport {
     ) -> Result<Self, MeasureError> {
         let spread = spread(mesh, size, watch)?;
         let shape = shape(mesh, Some(&grid.bounds()), watch)?;
-        // d in samples: by the geometric mean over the axes, where steps differ
-        let size = size.mean / grid.step.iter().product::<f64>().powf(1.0 / D as f64);
+        let size = samples_of(size.mean, grid);
         let found = features(potential, grid.shape, size, watch)?;
         let options = AlignmentOptions::new(size);
         let mesh = in_samples(mesh, grid);
@@ -189,6 +252,11 @@ impl MeshReport {
         alignment.selected = Some(selected);
         Ok(Self { shape, alignment, spread, fidelity: None, homogeneity: None })
     }
+}
+
+/// A length in samples: by the geometric mean over the axes, where steps differ.
+fn samples_of<const D: usize>(length: f64, grid: &Grid<D>) -> f64 {
+    length / grid.step.iter().product::<f64>().powf(1.0 / D as f64)
 }
 
 /// The mesh with its points moved from lattice to sample coordinates.

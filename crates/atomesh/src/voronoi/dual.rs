@@ -5,7 +5,7 @@ use rayon::prelude::*;
 use super::VoronoiError;
 use crate::geometry::linear::solve;
 use crate::geometry::{Bounds, Point, Simplex, difference, distance_squared, dot};
-use crate::mesh::{Delaunay, Mesh};
+use crate::mesh::{CellsOfPoints, Delaunay, Mesh};
 use crate::watch::Watch;
 
 /// Sites whose loops one task makes.
@@ -79,8 +79,8 @@ pub(super) fn dual<const D: usize>(
         .with_min_len(BLOCK)
         .map(|cell| Sphere::of(&mesh.simplex(cell)))
         .collect();
-    let (starts, cells) = mesh.cells_of_points();
-    let rings = Rings { mesh: &mesh, spheres: &spheres, starts, cells, sites: sites.len(), place };
+    let cells = mesh.cells_of_points();
+    let rings = Rings { mesh: &mesh, spheres: &spheres, cells, sites: sites.len(), place };
     let blocks: Vec<Block> = (0..sites.len().div_ceil(BLOCK))
         .into_par_iter()
         .map(|b| rings.block(b * BLOCK..((b + 1) * BLOCK).min(sites.len())))
@@ -182,8 +182,7 @@ type Link = [u32; 4];
 struct Rings<'a, const D: usize> {
     mesh: &'a Mesh<D>,
     spheres: &'a [Sphere<D>],
-    starts: Vec<u32>,
-    cells: Vec<u32>,
+    cells: CellsOfPoints,
     sites: usize,
     place: &'a Place<D>,
 }
@@ -206,7 +205,7 @@ impl<const D: usize> Rings<'_, D> {
     fn links(&self, site: usize, links: &mut Vec<Link>, block: &mut Block) {
         let (points, corners) = (self.mesh.points(), self.mesh.corners());
         let least = self.place.least_gap.powi(2);
-        for &cell in &self.cells[self.starts[site] as usize..self.starts[site + 1] as usize] {
+        for &cell in self.cells.of(site as u32) {
             let cell_corners = &corners[cell as usize * (D + 1)..(cell as usize + 1) * (D + 1)];
             let at = cell_corners.iter().position(|&c| c as usize == site).unwrap_or(0);
             let mut others: [u32; D] =

@@ -201,12 +201,33 @@ impl<const D: usize> PolyMesh<D> {
         })
     }
 
+    /// The points around a cell of a flat mesh, counter-clockwise where the cells are.
+    pub fn polygon(&self, cell: usize) -> Vec<u32> {
+        let mut edges: Vec<[u32; 2]> = (self.faces_of(cell))
+            .map(|(face, sign)| {
+                let ends = self.face(face);
+                if sign > 0.0 { [ends[0], ends[1]] } else { [ends[1], ends[0]] }
+            })
+            .collect();
+        let mut around = Vec::with_capacity(edges.len());
+        let mut at = edges.first().map_or(0, |edge| edge[0]);
+        while let Some(next) = edges.iter().position(|edge| edge[0] == at) {
+            around.push(at);
+            at = edges.swap_remove(next)[1];
+        }
+        around
+    }
+
     /// The simplices (segments in 2-D, triangles in 3-D) that a face is cut into, from its first point.
     pub fn simplices(&self, face: usize) -> impl Iterator<Item = [Point<D>; D]> + '_ {
+        self.parts(face).map(|corners| corners.map(|c| self.points[c as usize]))
+    }
+
+    /// The same by the numbers of their points.
+    pub fn parts(&self, face: usize) -> impl Iterator<Item = [u32; D]> + '_ {
         let corners = self.face(face);
-        (0..corners.len() + 1 - D).map(move |n| {
-            std::array::from_fn(|k| self.points[corners[if k == 0 { 0 } else { n + k }] as usize])
-        })
+        (0..corners.len() + 1 - D)
+            .map(move |n| std::array::from_fn(|k| corners[if k == 0 { 0 } else { n + k }]))
     }
 
     /// The normal of a face as long as the face is large, out of its owner.
