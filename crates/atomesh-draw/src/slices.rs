@@ -3,8 +3,9 @@
 use atomesh::geometry::Point;
 use atomesh::image::Image;
 use atomesh::mesh::Mesh;
+use atomesh::voronoi::PolyMesh;
 
-use crate::flat::{scale, typical_length};
+use crate::flat::{LOOKS, median, scale, typical_length};
 use crate::label::label;
 use crate::picture::{Picture, Place, Rect, Shape};
 use crate::raster::Ramp;
@@ -51,6 +52,29 @@ pub fn draw_slices(
     at: [usize; 3],
     style: &Style,
 ) -> Result<Picture, DrawError> {
+    draw(image, mesh, at, style)
+}
+
+/// Draws the cuts of polyhedra over the slices of an image, their sites as atoms; otherwise as
+/// [`draw_slices`].
+///
+/// # Errors
+/// As [`draw_slices`].
+pub fn draw_polyhedra(
+    image: &Image<3>,
+    mesh: &PolyMesh<3>,
+    at: [usize; 3],
+    style: &Style,
+) -> Result<Picture, DrawError> {
+    draw(image, mesh, at, style)
+}
+
+fn draw(
+    image: &Image<3>,
+    mesh: &dyn Sliced,
+    at: [usize; 3],
+    style: &Style,
+) -> Result<Picture, DrawError> {
     let style = style.checked()?;
     let shape = image.frame().shape();
     for axis in 0..3 {
@@ -61,7 +85,7 @@ pub fn draw_slices(
     let step = image.frame().grid(style.units).step;
     let sides: Point<3> = std::array::from_fn(|k| shape[k] as f64 * step[k]);
     let extent = [sides[1] + sides[0], sides[1] + sides[2]];
-    let scale = scale(typical_length(mesh, &step), &extent, style);
+    let scale = scale(mesh.edge(&step), &extent, style);
     let scene = Scene { image, mesh, at, style, pixels: step.map(|s| s * scale) };
     let ramp = Ramp::robust(image.samples(), style.brightness);
 
@@ -81,7 +105,7 @@ pub fn draw_slices(
 /// What all panels show.
 struct Scene<'a> {
     image: &'a Image<3>,
-    mesh: &'a Mesh<3>,
+    mesh: &'a dyn Sliced,
     at: [usize; 3],
     style: &'a Style,
     /// Pixels to a sample along each axis.
@@ -149,11 +173,9 @@ impl Panel<'_> {
     /// Where the plane cuts the faces of the cells, each line once, in pixels.
     fn cuts(&self) -> Vec<[Place; 2]> {
         let mut lines: Vec<[[i64; 2]; 2]> =
-            faces_cut(self.scene.mesh, self.plane.normal, self.level())
-                .into_iter()
-                .map(|face| {
-                    let [a, b] =
-                        self.cut(face).map(|p| self.place(&p).map(|v| (v * 100.0).round() as i64));
+            (self.scene.mesh.cuts(self.plane.normal, self.level()).into_iter())
+                .map(|ends| {
+                    let [a, b] = ends.map(|p| self.place(&p).map(|v| (v * 100.0).round() as i64));
                     [a.min(b), a.max(b)]
                 })
                 .filter(|[a, b]| a != b)
@@ -169,28 +191,10 @@ impl Panel<'_> {
         Level { value: at as f64, own_is_above: at > 0 }
     }
 
-    /// The ends of the line in which the plane cuts a face that it does cut.
-    fn cut(&self, face: [u32; 3]) -> [Point<3>; 2] {
-        let (normal, level) = (self.plane.normal, self.level());
-        let [a, b, c] = face.map(|i| self.scene.mesh.points()[i as usize]);
-        let side = |p: &Point<3>| level.is_below(p[normal]);
-        let crossing = |p: Point<3>, q: Point<3>| -> Point<3> {
-            let share = (level.value - p[normal]) / (q[normal] - p[normal]);
-            std::array::from_fn(|k| p[k] + share * (q[k] - p[k]))
-        };
-        // one corner is alone on its side
-        let (alone, others) = match (side(&a), side(&b), side(&c)) {
-            (x, y, z) if y == z && x != y => (a, [b, c]),
-            (x, y, z) if x == z && y != x => (b, [a, c]),
-            _ => (c, [a, b]),
-        };
-        others.map(|other| crossing(alone, other))
-    }
-
     fn atoms(&self) -> Vec<Place> {
         let (normal, value) = (self.plane.normal, self.level().value);
         let near = |p: &&Point<3>| (p[normal] - value).abs() <= 1.0;
-        self.scene.mesh.points().iter().filter(near).map(|p| self.place(p)).collect()
+        self.scene.mesh.atoms().iter().filter(near).map(|p| self.place(p)).collect()
     }
 }
 
@@ -205,6 +209,67 @@ struct Level {
 impl Level {
     fn is_below(&self, x: f64) -> bool {
         if self.own_is_above { x < self.value } else { x <= self.value }
+    }
+
+    /// The line in which the plane across axis `normal` cuts a convex polygon, if it does.
+    fn cut(self, normal: usize, corners: &[Point<3>]) -> Option<[Point<3>; 2]> {
+        let mut ends = (0..corners.len()).filter_map(|at| {
+            let (p, q) = (corners[at], corners[(at + 1) % corners.len()]);
+            if self.is_below(p[normal]) == self.is_below(q[normal]) {
+                return None;
+            }
+            let share = (self.value - p[normal]) / (q[normal] - p[normal]);
+            Some(std::array::from_fn(|k| p[k] + share * (q[k] - p[k])))
+        });
+        Some([ends.next()?, ends.next()?])
+    }
+}
+
+/// What slices show of a mesh.
+trait Sliced {
+    /// The lines in which a plane cuts the mesh's faces.
+    fn cuts(&self, normal: usize, level: Level) -> Vec<[Point<3>; 2]>;
+    /// The atoms.
+    fn atoms(&self) -> &[Point<3>];
+    /// The typical length of an edge, of samples with sides `step`.
+    fn edge(&self, step: &Point<3>) -> Option<f64>;
+}
+
+impl Sliced for Mesh<3> {
+    fn cuts(&self, normal: usize, level: Level) -> Vec<[Point<3>; 2]> {
+        let faces = faces_cut(self, normal, level).into_iter();
+        faces.flat_map(|face| level.cut(normal, &face.map(|i| self.points()[i as usize]))).collect()
+    }
+
+    fn atoms(&self) -> &[Point<3>] {
+        self.points()
+    }
+
+    fn edge(&self, step: &Point<3>) -> Option<f64> {
+        typical_length(self, step)
+    }
+}
+
+impl Sliced for PolyMesh<3> {
+    fn cuts(&self, normal: usize, level: Level) -> Vec<[Point<3>; 2]> {
+        let points = |face: usize| self.face(face).iter().map(|&c| self.points()[c as usize]);
+        let cut = |face| level.cut(normal, &points(face).collect::<Vec<_>>());
+        (0..self.face_count()).flat_map(cut).collect()
+    }
+
+    fn atoms(&self) -> &[Point<3>] {
+        self.sites()
+    }
+
+    /// From site to site: cells are as large as tetrahedra's edges are long.
+    fn edge(&self, step: &Point<3>) -> Option<f64> {
+        let faces = (0..self.inner_face_count()).step_by(self.face_count().div_ceil(LOOKS).max(1));
+        let length = |face: usize| {
+            let [a, b] = [self.owners()[face], self.neighbours()[face]];
+            let [a, b] = [a, b].map(|cell| self.sites()[cell as usize]);
+            (0..3).map(|k| ((b[k] - a[k]) * step[k]).powi(2)).sum::<f64>().sqrt()
+        };
+        median(faces.map(length).collect())
     }
 }
 

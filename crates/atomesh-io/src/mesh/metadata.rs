@@ -10,7 +10,7 @@ pub(super) const NAME: &str = "atomesh";
 
 /// The text for a mesh; the same for the same data.
 pub(super) fn encode<const D: usize>(data: &MeshData<D>) -> String {
-    Value::Object(object(data)).to_string()
+    encode_parts(data.frame(), data.provenance())
 }
 
 /// The same with the numbers by which a format that has numbers above 0 alone knows other regions.
@@ -18,21 +18,32 @@ pub(super) fn encode_with_regions<const D: usize>(
     data: &MeshData<D>,
     known_as: &[(i32, i32)],
 ) -> String {
-    let mut object = object(data);
+    let mut object = object(data.frame(), data.provenance());
     if !known_as.is_empty() {
         object.insert("regions".into(), json!(known_as));
     }
     Value::Object(object).to_string()
 }
 
-fn object<const D: usize>(data: &MeshData<D>) -> serde_json::Map<String, Value> {
+/// The text for a frame and a provenance, as far as they are known.
+pub(super) fn encode_parts<const D: usize>(
+    frame: Option<&Frame<D>>,
+    provenance: Option<&Provenance>,
+) -> String {
+    Value::Object(object(frame, provenance)).to_string()
+}
+
+fn object<const D: usize>(
+    frame: Option<&Frame<D>>,
+    provenance: Option<&Provenance>,
+) -> serde_json::Map<String, Value> {
     let mut object = serde_json::Map::new();
-    if let Some(p) = data.provenance() {
+    if let Some(p) = provenance {
         object.insert("version".into(), p.version.clone().into());
         object.insert("seed".into(), p.seed.into());
         object.insert("options".into(), p.options.clone());
     }
-    if let Some(f) = data.frame() {
+    if let Some(f) = frame {
         object.insert(
             "frame".into(),
             json!({

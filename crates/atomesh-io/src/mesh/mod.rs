@@ -5,6 +5,7 @@
 //! [`Provenance`]; all but VTK legacy and NPZ hold its tags. The same
 //! [`MeshData`] makes the same bytes, at any number of threads.
 
+pub mod cells;
 pub(crate) mod column;
 mod data;
 pub mod inp;

@@ -2,10 +2,12 @@
 
 pub(crate) mod appended;
 mod array;
+mod cells;
 mod read;
 mod write;
 mod xml;
 
+pub use cells::write_cells_vtu;
 pub use read::read_vtu;
 pub use write::write_vtu;
 

@@ -1,0 +1,164 @@
+//! The list of connections that flow simulators read: three tables as CSV and a head as JSON.
+
+use std::fmt::Write as _;
+use std::io::{self, Write};
+use std::path::{Path, PathBuf};
+
+use atomesh::voronoi::{boundary_connections, connections, side_name};
+use atomesh::watch::{Phase, Watch, check};
+use serde_json::json;
+
+use super::super::MeshWriteError;
+use super::CellData;
+use crate::atomic_file::AtomicFile;
+
+/// Where a list of connections goes: a head, and three tables beside it.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub struct ConnectionFiles {
+    /// The head, as JSON.
+    pub head: PathBuf,
+    /// The cells.
+    pub cells: PathBuf,
+    /// The faces between two cells.
+    pub connections: PathBuf,
+    /// The faces on the sides of the box.
+    pub boundary: PathBuf,
+}
+
+impl ConnectionFiles {
+    /// The files for the head `NAME.json`: NAME-cells.csv, NAME-connections.csv and NAME-boundary.csv beside it.
+    pub fn of(head: &Path) -> Self {
+        let stem = head.file_stem().unwrap_or_default().to_string_lossy().into_owned();
+        let table = |name: &str| head.with_file_name(format!("{stem}-{name}.csv"));
+        Self {
+            head: head.into(),
+            cells: table("cells"),
+            connections: table("connections"),
+            boundary: table("boundary"),
+        }
+    }
+
+    /// All of them.
+    pub fn paths(&self) -> [&Path; 4] {
+        [&self.head, &self.cells, &self.connections, &self.boundary]
+    }
+}
+
+/// Writes the list. All files appear only when all are written.
+///
+/// # Errors
+/// If a file cannot be written, or the watch ends the work.
+pub fn write_connections<const D: usize>(
+    files: &ConnectionFiles,
+    data: &CellData<D>,
+    watch: &mut dyn Watch,
+) -> Result<(), MeshWriteError> {
+    let mut finished = Vec::new();
+    let texts: [fn(&CellData<D>, &ConnectionFiles) -> String; 4] = [head, cells, inner, boundary];
+    for (n, (path, text)) in files.paths().into_iter().zip(texts).enumerate() {
+        check(watch, Phase::Write, n as f64 / 4.0, None)?;
+        let mut file = AtomicFile::create(path)?;
+        file.write_all(text(data, files).as_bytes())?;
+        finished.push(file);
+    }
+    let committed: io::Result<Vec<()>> = finished.into_iter().map(AtomicFile::commit).collect();
+    committed?;
+    Ok(())
+}
+
+/// The names of the axes.
+const AXES: [&str; 3] = ["x", "y", "z"];
+
+/// The names of a vector's components.
+fn vector<const D: usize>(name: &str) -> String {
+    AXES[..D].iter().map(|axis| format!("{name}_{axis}")).collect::<Vec<_>>().join(",")
+}
+
+/// Appends numbers, each with as many digits as tell it from all others.
+fn put(text: &mut String, numbers: &[f64]) {
+    for number in numbers {
+        let _ = write!(text, ",{number:?}");
+    }
+}
+
+fn cells<const D: usize>(data: &CellData<D>, _: &ConnectionFiles) -> String {
+    let mesh = data.mesh;
+    let mut text = format!("cell,{},volume,{}\n", vector::<D>("site"), vector::<D>("center"));
+    for cell in 0..mesh.cell_count() {
+        let _ = write!(text, "{cell}");
+        put(&mut text, &mesh.sites()[cell]);
+        put(&mut text, &[mesh.measures()[cell]]);
+        put(&mut text, &mesh.centroids()[cell]);
+        text.push('\n');
+    }
+    text
+}
+
+fn inner<const D: usize>(data: &CellData<D>, _: &ConnectionFiles) -> String {
+    let (normal, face) = (vector::<D>("normal"), vector::<D>("face"));
+    let mut text = format!(
+        "cell_i,cell_j,area,distance_i,distance_j,{normal},{face},geometry,orthogonality,feature\n"
+    );
+    for (connection, feature) in connections(data.mesh).iter().zip(&data.features.of_faces) {
+        let _ = write!(text, "{},{}", connection.cells[0], connection.cells[1]);
+        put(&mut text, &[connection.area]);
+        put(&mut text, &connection.distances);
+        put(&mut text, &connection.normal);
+        put(&mut text, &connection.centroid);
+        put(&mut text, &[connection.geometry(), connection.orthogonality]);
+        let _ = writeln!(text, ",{feature}");
+    }
+    text
+}
+
+fn boundary<const D: usize>(data: &CellData<D>, _: &ConnectionFiles) -> String {
+    let (normal, face) = (vector::<D>("normal"), vector::<D>("face"));
+    let mut text = format!("cell,side,area,distance,{normal},{face}\n");
+    for side in boundary_connections(data.mesh) {
+        let _ = write!(text, "{},{}", side.cell, side_name(side.side));
+        put(&mut text, &[side.area, side.distance]);
+        put(&mut text, &side.normal);
+        put(&mut text, &side.centroid);
+        text.push('\n');
+    }
+    text
+}
+
+fn head<const D: usize>(data: &CellData<D>, files: &ConnectionFiles) -> String {
+    let mesh = data.mesh;
+    let name = |path: &Path| path.file_name().unwrap_or_default().to_string_lossy().into_owned();
+    let measure = if D == 2 { "area" } else { "volume" };
+    let area = if D == 2 { "length" } else { "area" };
+    let metadata: serde_json::Value = serde_json::from_str(&data.metadata()).unwrap_or_default();
+    let features: Vec<_> = (data.features.areas.iter().enumerate())
+        .map(|(n, area)| json!({ "id": n + 1, "name": format!("feature{}", n + 1), "area": area }))
+        .collect();
+    let text = json!({
+        "format": "atomesh connections",
+        "format_version": 1,
+        "dimension": D,
+        "units": "world units of the frame, lengths, areas and volumes alike",
+        "cells": { "file": name(&files.cells), "count": mesh.cell_count(), "numbered_from": 0 },
+        "connections": { "file": name(&files.connections), "count": mesh.inner_face_count() },
+        "boundary": {
+            "file": name(&files.boundary),
+            "count": mesh.face_count() - mesh.inner_face_count(),
+            "sides": (0..2 * D).map(side_name).collect::<Vec<_>>(),
+        },
+        "columns": {
+            "site": "the point whose nearest points are the cell; on the cell's border at a side of the box",
+            "volume": format!("the cell's {measure}"),
+            "center": "the cell's centroid",
+            "area": format!("the face's {area}"),
+            "distance_i, distance_j": "from each site to the plane of the face; distance: 0 where a site lies on the side",
+            "normal": "unit normal, from cell_i to cell_j, or out of the box",
+            "face": "the face's centroid",
+            "geometry": "area / (distance_i + distance_j): transmissibility over permeability where both cells have the same; with k_i and k_j it is area / (distance_i/k_i + distance_j/k_j)",
+            "orthogonality": "cosine of the angle between normal and the line from site to site; 1 unless the frame stretches the lattice",
+            "feature": "the feature that the face lies on, from 1 on; 0 for none",
+        },
+        "features": features,
+        "metadata": metadata,
+    });
+    format!("{text:#}\n")
+}

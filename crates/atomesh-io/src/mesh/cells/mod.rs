@@ -1,0 +1,35 @@
+//! Files of polygons and polyhedra: VTU, OpenFOAM's polyMesh, and lists of connections.
+//!
+//! All hold world coordinates, and name cells, faces and points from 0 on in the mesh's order, so that a cell of
+//! one file is the cell of that number in the others.
+
+mod connections;
+mod foam;
+
+pub use connections::{ConnectionFiles, write_connections};
+pub use foam::poly_mesh_of;
+
+use atomesh::image::Frame;
+use atomesh::voronoi::{FeatureFaces, PolyMesh};
+
+use super::Provenance;
+
+/// Polygons or polyhedra in world coordinates, with what is known of them.
+#[derive(Clone, Copy, Debug)]
+pub struct CellData<'a, const D: usize> {
+    /// The mesh, in world coordinates.
+    pub mesh: &'a PolyMesh<D>,
+    /// Which of its faces lie on features of the image.
+    pub features: &'a FeatureFaces,
+    /// The frame of the image that the mesh follows.
+    pub frame: &'a Frame<D>,
+    /// Where it comes from.
+    pub provenance: &'a Provenance,
+}
+
+impl<const D: usize> CellData<'_, D> {
+    /// Frame and provenance as JSON, the text that all mesh files carry.
+    pub(super) fn metadata(&self) -> String {
+        super::metadata::encode_parts(Some(self.frame), Some(self.provenance))
+    }
+}
