@@ -3,7 +3,10 @@
 use atomesh::image::Image;
 use atomesh::mesh::Mesh;
 use atomesh::pipeline::Method;
-use atomesh_draw::{DrawError, Picture, Style, draw_flat, draw_slices};
+use atomesh::voronoi::PolyMesh;
+use atomesh_draw::{
+    DrawError, Picture, Style, draw_flat, draw_polygons, draw_polyhedra, draw_slices,
+};
 use atomesh_io::image::AnyImage;
 
 /// How images of `D` axes are meshed and shown.
@@ -12,10 +15,14 @@ pub struct Dimension<const D: usize> {
     pub method: Method<D>,
     /// Draws a mesh in sample coordinates over its image.
     pub draw: fn(&Image<D>, &Mesh<D>, &Style) -> Result<Picture, DrawError>,
+    /// Draws Voronoi cells in sample coordinates over their image.
+    pub draw_cells: fn(&Image<D>, &PolyMesh<D>, &Style) -> Result<Picture, DrawError>,
     /// The image if it has `D` axes.
     pub image: fn(AnyImage) -> Option<Image<D>>,
     /// What the cells are called, more than one of them.
     pub cells: &'static str,
+    /// What Voronoi cells are called, more than one of them.
+    pub voronoi_cells: &'static str,
 }
 
 impl Dimension<2> {
@@ -24,11 +31,13 @@ impl Dimension<2> {
         Self {
             method: Method::flat(),
             draw: draw_flat,
+            draw_cells: draw_polygons,
             image: |any| match any {
                 AnyImage::Flat(image) => Some(image),
                 AnyImage::Volume(_) => None,
             },
             cells: "triangles",
+            voronoi_cells: "polygons",
         }
     }
 }
@@ -42,11 +51,16 @@ impl Dimension<3> {
                 let style = Style { atoms: true, ..style.clone() };
                 draw_slices(image, mesh, image.frame().shape().map(|n| n / 2), &style)
             },
+            draw_cells: |image, mesh, style| {
+                let style = Style { atoms: true, ..style.clone() };
+                draw_polyhedra(image, mesh, image.frame().shape().map(|n| n / 2), &style)
+            },
             image: |any| match any {
                 AnyImage::Volume(image) => Some(image),
                 AnyImage::Flat(_) => None,
             },
             cells: "tetrahedra",
+            voronoi_cells: "polyhedra",
         }
     }
 }

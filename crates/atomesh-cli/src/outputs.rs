@@ -1,6 +1,6 @@
 //! The files that a run writes: refused before the work if they cannot be, written after it.
 
-use std::io::Write;
+use std::io::{self, Write};
 use std::path::{Path, PathBuf};
 
 use atomesh::features::FeatureFacetOptions;
@@ -11,20 +11,24 @@ use atomesh::watch::{Phase, Watch};
 use atomesh_draw::{PictureFormat, Style};
 use atomesh_io::atomic_file::AtomicFile;
 use atomesh_io::image::{ImageFormat, WriteReason, write_image};
+use atomesh_io::mesh::cells::{CellData, ConnectionFiles, poly_mesh_of, write_connections};
 use atomesh_io::mesh::msh::MshVersion;
+use atomesh_io::mesh::polymesh::{check_poly_mesh_writable, write_poly_mesh};
+use atomesh_io::mesh::vtu::write_cells_vtu;
 use atomesh_io::mesh::{MeshData, MeshFormat, MeshWriteError, Provenance, write_mesh_as};
 
 use crate::dimension::Dimension;
 use crate::failure::Failure;
 use crate::progress::Progress;
-use crate::run_config::{InputOptions, OutputOptions};
+use crate::run_config::{InputOptions, RunConfig};
 
 /// Where everything goes, in formats that are known.
 #[derive(Clone, Debug)]
 pub struct Outputs {
     /// The mesh.
     pub mesh: PathBuf,
-    mesh_format: MeshFormat,
+    mesh_format: Format,
+    connections: Option<ConnectionFiles>,
     picture: Option<(PathBuf, PictureFormat)>,
     /// The report.
     pub report: Option<PathBuf>,
@@ -35,22 +39,78 @@ pub struct Outputs {
     z_is_height: bool,
 }
 
+/// What the mesh is written as.
+#[derive(Clone, Copy, Debug)]
+enum Format {
+    /// Triangles or tetrahedra.
+    Simplices(MeshFormat),
+    /// Voronoi cells as VTU.
+    CellsVtu,
+    /// Voronoi cells as OpenFOAM's folder.
+    CellsFoam,
+}
+
+impl Format {
+    /// The format that a path calls for.
+    fn of(mesh: &Path, is_voronoi: bool, msh: Option<&str>) -> Result<Self, Failure> {
+        if is_voronoi {
+            let is_foam = mesh.file_name().is_some_and(|name| name == "polyMesh");
+            return match MeshFormat::of(mesh) {
+                _ if is_foam => Ok(Self::CellsFoam),
+                Ok(MeshFormat::Vtu) => Ok(Self::CellsVtu),
+                _ => {
+                    let message =
+                        "Voronoi cells are written as .vtu, or into a folder named polyMesh";
+                    Err(Failure::misuse(message).about(mesh))
+                }
+            };
+        }
+        let format =
+            MeshFormat::of(mesh).map_err(|_| unknown_ending(mesh, MeshFormat::EXTENSIONS))?;
+        let Some(version) = msh else { return Ok(Self::Simplices(format)) };
+        match format {
+            MeshFormat::Msh(_, encoding) => {
+                Ok(Self::Simplices(MeshFormat::Msh(msh_version(version)?, encoding)))
+            }
+            _ => Err(Failure::misuse("--msh is for .msh files").about(mesh)),
+        }
+    }
+
+    /// Whether it holds groups of facets that follow features.
+    fn holds_tags(self) -> bool {
+        matches!(self, Self::Simplices(format) if format.holds_tags())
+    }
+
+    /// Tries whether the mesh can be written.
+    fn check_writable(self, path: &Path) -> io::Result<()> {
+        match self {
+            Self::Simplices(format) => format.check_writable(path),
+            Self::CellsVtu => AtomicFile::create(path).map(drop),
+            Self::CellsFoam => check_poly_mesh_writable(path),
+        }
+    }
+}
+
 impl Outputs {
     /// The files of a run on an image.
     ///
     /// # Errors
     /// [`Failure`] if the mesh is missing or an ending unknown.
-    pub fn new(options: &OutputOptions, image: &Path) -> Result<Self, Failure> {
+    pub fn new(run: &RunConfig, image: &Path) -> Result<Self, Failure> {
+        let options = &run.output;
         let Some(mesh) = options.output.clone() else {
             return Err(Failure::misuse("no mesh to write; expected -o MESH, as in -o mesh.vtu"));
         };
-        let mut mesh_format =
-            MeshFormat::of(&mesh).map_err(|_| unknown_ending(&mesh, MeshFormat::EXTENSIONS))?;
-        if let Some(version) = &options.msh {
-            let MeshFormat::Msh(_, encoding) = mesh_format else {
-                return Err(Failure::misuse("--msh is for .msh files").about(&mesh));
-            };
-            mesh_format = MeshFormat::Msh(msh_version(version)?, encoding);
+        let mesh_format = Format::of(&mesh, run.is_voronoi(), options.msh.as_deref())?;
+        let connections = options.connections.as_deref().map(ConnectionFiles::of);
+        if let (Some(files), false) = (&connections, run.is_voronoi()) {
+            let failure = Failure::misuse("--connections lists those of Voronoi cells");
+            return Err(failure.about(&files.head).advise("add --mesh voronoi"));
+        }
+        if let Some(files) =
+            connections.as_ref().filter(|files| files.head.extension().is_none_or(|e| e != "json"))
+        {
+            return Err(unknown_ending(&files.head, ".json"));
         }
         let picture = match &options.picture {
             Some(path) => {
@@ -74,7 +134,16 @@ impl Outputs {
             let message = "the format holds no tags; expected .vtu, .msh, .msh2, .inp or polyMesh";
             return Err(Failure::misuse(message).about(&mesh));
         }
-        Ok(Self { mesh, mesh_format, picture, report, potential, tag_features, z_is_height })
+        Ok(Self {
+            mesh,
+            mesh_format,
+            connections,
+            picture,
+            report,
+            potential,
+            tag_features,
+            z_is_height,
+        })
     }
 
     /// Whether the image is still needed after the atoms have felt it.
@@ -90,7 +159,9 @@ impl Outputs {
     fn paths(&self) -> impl Iterator<Item = &Path> {
         let picture = self.picture.as_ref().map(|(path, _)| path);
         let others = [picture, self.report.as_ref(), self.potential.as_ref()];
-        [Some(&self.mesh)].into_iter().chain(others).flatten().map(PathBuf::as_path)
+        let others = others.into_iter().flatten().map(PathBuf::as_path);
+        let tables = self.connections.iter().flat_map(ConnectionFiles::paths);
+        [self.mesh.as_path()].into_iter().chain(others).chain(tables)
     }
 
     /// Tries whether every file can be written, and would not take the place of another or of an
@@ -134,7 +205,10 @@ impl Outputs {
             watch.begin(Phase::Draw);
             let z_up = self.z_is_height && outcome.frame().direction()[D - 1][D - 1] > 0.0;
             let style = Style { units: outcome.units(), z_up, ..Style::default() };
-            let picture = (dimension.draw)(image, &outcome.sample_mesh(), &style);
+            let picture = match outcome.sample_cells() {
+                Some(cells) => (dimension.draw_cells)(image, &cells, &style),
+                None => (dimension.draw)(image, &outcome.sample_mesh(), &style),
+            };
             let bytes = picture.and_then(|p| p.encode(*format)).map_err(Failure::content)?;
             write_bytes(path, &bytes)?;
         }
@@ -144,6 +218,9 @@ impl Outputs {
         }
         let seed = options["optimize"]["seed"].as_u64().unwrap_or(0);
         let provenance = Provenance { version: env!("CARGO_PKG_VERSION").into(), options, seed };
+        let Format::Simplices(format) = self.mesh_format else {
+            return self.write_cells(outcome, &provenance, watch);
+        };
         let mesh = outcome.world_mesh();
         let tags = self.tags(outcome, &mesh, watch)?;
         let data = MeshData::new(&mesh).with_frame(outcome.frame()).with_provenance(&provenance);
@@ -152,10 +229,44 @@ impl Outputs {
             .with_point_field("distance", outcome.distance_at_points())
             .and_then(|data| data.with_point_field("potential", outcome.potential_at_points()))
             .map_err(Failure::content)?;
-        write_mesh_as(&self.mesh, self.mesh_format, &data, watch).map_err(|e| match e {
+        write_mesh_as(&self.mesh, format, &data, watch).map_err(|e| self.mesh_failure(e))
+    }
+
+    /// Writes Voronoi cells and their connections.
+    fn write_cells<const D: usize>(
+        &self,
+        outcome: &Outcome<D>,
+        provenance: &Provenance,
+        watch: &mut Progress,
+    ) -> Result<(), Failure> {
+        let (Some(mesh), Some(features)) = (outcome.world_cells(), outcome.cell_features()) else {
+            return Err(Failure::content("the run made no Voronoi cells"));
+        };
+        let frame = outcome.frame();
+        let data = CellData { mesh: &mesh, features: &features, frame, provenance };
+        let written = match self.mesh_format {
+            Format::CellsFoam => {
+                let mesh = poly_mesh_of(&data).map_err(Failure::content)?;
+                write_poly_mesh(&self.mesh, &mesh, watch)
+            }
+            _ => (|| {
+                let mut file = AtomicFile::create(&self.mesh)?;
+                write_cells_vtu(&mut file, &data, watch)?;
+                Ok(file.commit()?)
+            })(),
+        };
+        written.map_err(|e| self.mesh_failure(e))?;
+        match &self.connections {
+            Some(files) => write_connections(files, &data, watch).map_err(|e| self.mesh_failure(e)),
+            None => Ok(()),
+        }
+    }
+
+    fn mesh_failure(&self, error: MeshWriteError) -> Failure {
+        match error {
             MeshWriteError::Cancelled(_) => Failure::cancelled(),
-            _ => Failure::content(e).about(&self.mesh),
-        })
+            _ => Failure::content(error).about(&self.mesh),
+        }
     }
 }
 
@@ -220,10 +331,10 @@ pub fn write_bytes(path: &Path, bytes: &[u8]) -> Result<(), Failure> {
     write().map_err(|e| cannot_write(path, &e))
 }
 
-fn cannot_write(path: &Path, error: &std::io::Error) -> Failure {
+fn cannot_write(path: &Path, error: &io::Error) -> Failure {
     let failure = Failure::content(format!("cannot be written: {error}")).about(path);
     match error.kind() {
-        std::io::ErrorKind::NotFound => failure.advise("make its folder first"),
+        io::ErrorKind::NotFound => failure.advise("make its folder first"),
         _ => failure,
     }
 }

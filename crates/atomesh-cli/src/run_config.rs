@@ -5,7 +5,7 @@ use std::path::PathBuf;
 use atomesh::enhance::{EdgeOperator, FeatureOptions, Features};
 use atomesh::image::Units;
 use atomesh::optimize::{EngineKind, OptimizeOptions};
-use atomesh::pipeline::{LatticeKind, MeshOptions, Size};
+use atomesh::pipeline::{LatticeKind, MeshKind, MeshOptions, Size};
 use atomesh::potential::Interpolation;
 use serde::{Deserialize, Serialize};
 
@@ -53,7 +53,8 @@ section! {
         #[arg(long, value_name = "SIGMA",
             value_parser = number_in(0.3, 1000.0, "a number of samples from 0.3 to 1000"))]
         pub edge_scale: f64,
-        /// Push atoms off features, so that they line up alongside. Default: false
+        /// Push atoms off features, so that they line up alongside. Default: false; true with
+        /// --mesh voronoi, whose faces then fall on the features
         #[arg(long, value_name = "BOOL", num_args = 0..=1, require_equals = true,
             default_missing_value = "true")]
         pub repel: bool,
@@ -72,6 +73,11 @@ section! {
 section! {
     /// The lattice of atoms.
     pub struct LatticeOptions {
+        /// Cells: triangles or tetrahedra between the atoms, or Voronoi's (PEBI) polygons or
+        /// polyhedra around them, cut by the image's box. Default: delaunay
+        #[arg(long, value_name = "KIND",
+            value_parser = named::<MeshKind>(&["delaunay", "voronoi"]))]
+        pub mesh: MeshKind,
         /// Edge length wanted, in lattice units: one, as in 8, or from features to elsewhere, as in
         /// 6..18. Default: from the size of the image
         #[arg(long, value_name = "D | MIN..MAX", allow_hyphen_values = true)]
@@ -138,7 +144,7 @@ section! {
     /// The files that are written.
     pub struct OutputOptions {
         /// Mesh to write: .vtu .vtk .msh (Gmsh 4.1) .msh2 (Gmsh 2.2) .npz .inp (Abaqus), or a folder named
-        /// polyMesh (OpenFOAM). Coordinates are the image's world coordinates
+        /// polyMesh (OpenFOAM); Voronoi cells: .vtu or polyMesh. Coordinates are the image's world coordinates
         #[arg(short, long, value_name = "MESH")]
         pub output: PathBuf,
         /// Version of Gmsh's format in a .msh file. Default: 4.1
@@ -149,6 +155,10 @@ section! {
         #[arg(long, value_name = "B", allow_hyphen_values = true,
             value_parser = number_in(-1.0, 1.0, "a number from -1 to 1"))]
         pub tag_features: f64,
+        /// List of the connections of Voronoi cells, for flow simulators: a head as JSON, and beside
+        /// it NAME-cells.csv, NAME-connections.csv and NAME-boundary.csv
+        #[arg(long, value_name = "NAME.json")]
+        pub connections: PathBuf,
         /// Picture of the mesh over the image, .png or .svg; in 3-D of the three slices through the
         /// middle
         #[arg(long, value_name = "PICTURE")]
@@ -193,6 +203,11 @@ pub struct RunConfig {
 }
 
 impl RunConfig {
+    /// Whether the cells are Voronoi's.
+    pub fn is_voronoi(&self) -> bool {
+        self.lattice.mesh == Some(MeshKind::Voronoi)
+    }
+
     /// Reads a configuration.
     ///
     /// # Errors
@@ -242,6 +257,7 @@ impl RunConfig {
         let moves = mesh.optimize.clone();
         let mut defaults = Self {
             lattice: LatticeOptions {
+                mesh: Some(mesh.kind),
                 beta: Some(mesh.image_weight),
                 units: Some(mesh.units),
                 spacing_factor: Some(mesh.spacing_factor),
@@ -251,7 +267,7 @@ impl RunConfig {
                 features: Some(features.features),
                 edge_operator: Some(features.edge_operator),
                 edge_scale: Some(features.edge_scale),
-                repel: Some(features.repel),
+                repel: Some(self.is_voronoi() || features.repel),
                 smooth: features.smooth,
                 interpolation: Some(mesh.interpolation),
             },
@@ -302,10 +318,11 @@ impl RunConfig {
                 edge_operator: features.edge_operator.unwrap_or(basis.edge_operator),
                 edge_scale: features.edge_scale.unwrap_or(basis.edge_scale),
                 smooth: features.smooth.or(basis.smooth),
-                repel: features.repel.unwrap_or(basis.repel),
+                repel: features.repel.unwrap_or(self.is_voronoi() || basis.repel),
                 ..basis
             },
             interpolation: features.interpolation.unwrap_or(default.interpolation),
+            kind: lattice.mesh.unwrap_or(default.kind),
             units: lattice.units.unwrap_or(default.units),
             size: lattice.size.map_or(Size::Default, |s| s.0),
             image_weight: lattice.beta.unwrap_or(default.image_weight),

@@ -8,7 +8,9 @@ use atomesh::image::Image;
 use atomesh::lattice::LatticeError;
 use atomesh::measure::{ShapeReport, shape};
 use atomesh::optimize::OptimizeError;
-use atomesh::pipeline::{Inputs, MeshReport, Outcome, PipelineError, Prepared, prepare};
+use atomesh::pipeline::{
+    Inputs, MeshReport, Outcome, PipelineError, Prepared, VoronoiReport, prepare,
+};
 use atomesh::potential::PotentialError;
 use atomesh::watch::Watch;
 use atomesh_io::image::AnyImage;
@@ -61,6 +63,8 @@ Examples:
     atomesh mesh faults.png -o faults.msh --size 6..18 --write-config run.toml
   Run it again with another seed:
     atomesh mesh --config run.toml --seed 1 -o other.msh
+  Polygons whose edges fall on the faults, with the connections that flow needs:
+    atomesh mesh faults.png -o faults.vtu --size 8 --mesh voronoi --connections faults.json
   Raw samples with wells as fixed atoms:
     atomesh mesh cube.raw -o cube.vtu --shape 300,200,100 --dtype float32 \\
       --spacing 25,25,4 --seed-point 2500,1000,200 --seed-point 5000,4000,200";
@@ -78,7 +82,7 @@ pub fn run(args: MeshArgs, watch: &mut Progress) -> Result<String, Failure> {
     }
     run.check()?;
     let shown = shown_path(&run)?.to_path_buf();
-    let outputs = if args.dry_run { None } else { Some(Outputs::new(&run.output, &shown)?) };
+    let outputs = if args.dry_run { None } else { Some(Outputs::new(&run, &shown)?) };
     if let Some(outputs) = &outputs {
         let _guard = writing();
         outputs.check(&run.input, args.write_config.as_deref())?;
@@ -136,7 +140,9 @@ impl Job<'_> {
             let text = format!("{:#}\n", self.report(&outcome, &figures, watch));
             write_bytes(path, text.as_bytes())?;
         }
-        if let Some(shape) = &figures.shape {
+        if let Some(report) = &figures.cells {
+            watch.say(&cells_summary(&outputs.mesh, report, dimension, watch));
+        } else if let Some(shape) = &figures.shape {
             watch.say(&summary(&outputs.mesh, shape, dimension, watch));
         }
         Ok(String::new())
@@ -218,9 +224,14 @@ impl Job<'_> {
         alignment: bool,
         watch: &mut Progress,
     ) -> Result<Figures, Failure> {
+        if outcome.cells().is_some() && (alignment || watch.verbosity() != Verbosity::Quiet) {
+            let cells = outcome.cells_report(watch).map_err(|e| self.failure(e))?;
+            return Ok(Figures { cells, ..Figures::default() });
+        }
         if alignment {
             let report = outcome.report(watch).map_err(|e| self.failure(e))?;
-            return Ok(Figures { shape: Some(report.shape.clone()), report: Some(report) });
+            let shape = Some(report.shape.clone());
+            return Ok(Figures { shape, report: Some(report), cells: None });
         }
         if watch.verbosity() == Verbosity::Quiet {
             return Ok(Figures::default());
@@ -228,7 +239,7 @@ impl Job<'_> {
         let bounds = outcome.potential().grid().bounds();
         let shape = shape(outcome.mesh(), Some(&bounds), watch);
         let shape = shape.map_err(|e| self.failure(PipelineError::Measure(e)))?;
-        Ok(Figures { shape: Some(shape), report: None })
+        Ok(Figures { shape: Some(shape), ..Figures::default() })
     }
 
     /// The report as JSON: the mesh's figures, then the run's.
@@ -256,8 +267,8 @@ impl Job<'_> {
                 "mean": distance.mean(),
                 "greatest": distance.greatest(),
             },
-            "shape": figures.report.as_ref().map(|r| &r.shape),
-            "alignment": figures.report.as_ref().map(|r| &r.alignment),
+            "shape": figures.shape_json(),
+            "alignment": figures.alignment_json(),
             "optimizer": outcome.optimize_report(),
             "seconds": seconds,
             "seconds_total": watch.elapsed().as_secs_f64(),
@@ -330,6 +341,46 @@ fn field_failure(error: &PipelineError, path: Option<&Path>) -> Failure {
 struct Figures {
     shape: Option<ShapeReport>,
     report: Option<MeshReport>,
+    cells: Option<VoronoiReport>,
+}
+
+impl Figures {
+    /// The shape of what the mesh is made of.
+    fn shape_json(&self) -> serde_json::Value {
+        match &self.cells {
+            Some(cells) => json!(cells.shape),
+            None => json!(self.report.as_ref().map(|r| &r.shape)),
+        }
+    }
+
+    fn alignment_json(&self) -> serde_json::Value {
+        match &self.cells {
+            Some(cells) => json!(cells.alignment),
+            None => json!(self.report.as_ref().map(|r| &r.alignment)),
+        }
+    }
+}
+
+fn cells_summary<const D: usize>(
+    path: &Path,
+    report: &VoronoiReport,
+    dimension: &Dimension<D>,
+    watch: &Progress,
+) -> String {
+    let (shape, name) = (&report.shape, dimension.voronoi_cells);
+    let followed = match report.alignment.recall {
+        Some(recall) => format!("; {:.0} % of features followed", 100.0 * recall),
+        None => String::new(),
+    };
+    format!(
+        "{}: {} {name}, {} faces; {:.1} faces a cell; volume error {:.1e}{followed}; {:.2} s",
+        path.display(),
+        shape.cells,
+        shape.faces,
+        shape.faces_per_cell_mean,
+        shape.volume_error,
+        watch.elapsed().as_secs_f64(),
+    )
 }
 
 fn summary<const D: usize>(
