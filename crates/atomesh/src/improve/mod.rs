@@ -8,6 +8,10 @@
 //! [`Improver`] is the contract; each dimension has its own. Points are never added or taken away; points
 //! without freedom stay, others stay on the side of the box that they lie on.
 
+mod space;
+
+pub use space::Space;
+
 use crate::mesh::{Mesh, MeshError};
 use crate::optimize::Fields;
 use crate::watch::{Cancelled, Watch};

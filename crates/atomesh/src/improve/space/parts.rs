@@ -1,0 +1,151 @@
+//! A mesh in parts that are worked on side by side.
+//!
+//! Points are halved again and again across their longest side, so that parts depend on places and not on threads. A
+//! cell belongs to the least part of its corners. A point with cells in other parts is held, and facets between parts
+//! stay; what a pass leaves undone there the next does, which cuts elsewhere and looks at the neighbourhood of held
+//! points alone.
+
+use super::patch::{NONE, Patch};
+use crate::geometry::{Bounds, Point};
+use std::collections::HashMap;
+
+/// The points of a part, about: enough that few are held, few enough for all cores and for a cache.
+const PART: usize = 6_000;
+
+/// Where each pass cuts: the share of the points before the cut.
+pub(super) const CUTS: [f64; 3] = [0.5, 0.3, 0.64];
+
+/// The mesh between passes.
+pub(super) struct Whole {
+    pub points: Vec<Point<3>>,
+    pub freedom: Vec<u8>,
+    pub sides: Vec<u8>,
+    pub corners: Vec<[u32; 4]>,
+}
+
+/// A part: its patch, and which points of the mesh the patch's are.
+pub(super) struct Part {
+    pub patch: Patch,
+    pub points: Vec<u32>,
+    /// Points of the patch that have cells elsewhere.
+    pub held: Vec<u32>,
+}
+
+/// The part of each point, and how many parts there are.
+fn parts_of(points: &[Point<3>], cut: f64) -> (Vec<u32>, usize) {
+    let levels = (points.len() / PART).checked_ilog2().map_or(0, |l| l + 1);
+    let mut order: Vec<u32> = (0..points.len() as u32).collect();
+    let mut part = vec![0; points.len()];
+    let mut slices: Vec<&mut [u32]> = vec![&mut order];
+    for _ in 0..levels {
+        slices = slices.into_iter().flat_map(|slice| halves(points, slice, cut)).collect();
+    }
+    for (number, slice) in slices.iter().enumerate() {
+        slice.iter().for_each(|&i| part[i as usize] = number as u32);
+    }
+    (part, slices.len())
+}
+
+/// Points on the two sides of a cut across their longest side.
+fn halves<'a>(points: &[Point<3>], slice: &'a mut [u32], cut: f64) -> [&'a mut [u32]; 2] {
+    let mut bounds = Bounds { min: [f64::INFINITY; 3], max: [f64::NEG_INFINITY; 3] };
+    slice.iter().for_each(|&i| bounds.include(&points[i as usize]));
+    let extent = bounds.extent();
+    let axis = (1..3).fold(0, |best, k| if extent[k] > extent[best] { k } else { best });
+    let middle = (slice.len() as f64 * cut) as usize;
+    if middle > 0 && middle < slice.len() {
+        slice.select_nth_unstable_by(middle, |&a, &b| {
+            points[a as usize][axis].total_cmp(&points[b as usize][axis]).then(a.cmp(&b))
+        });
+    }
+    let (low, high) = slice.split_at_mut(middle);
+    [low, high]
+}
+
+impl Whole {
+    /// The cells of each part, by their numbers; with `pending`, only those within some layers of its points.
+    pub fn divide(&self, cut: f64, pending: Option<&[bool]>) -> Vec<Vec<u32>> {
+        let (part, count) = parts_of(&self.points, cut);
+        let mut cells = vec![Vec::new(); count];
+        let near = pending.map(|pending| self.near(pending, LAYERS));
+        for (number, corners) in self.corners.iter().enumerate() {
+            if near.as_ref().is_none_or(|near| corners.iter().any(|&c| near[c as usize])) {
+                let least = corners.iter().map(|&c| part[c as usize]).min().unwrap_or(0);
+                cells[least as usize].push(number as u32);
+            }
+        }
+        cells
+    }
+
+    /// Points within some edges of the marked ones.
+    fn near(&self, marked: &[bool], layers: usize) -> Vec<bool> {
+        let mut near = marked.to_vec();
+        for _ in 0..layers {
+            let before = near.clone();
+            for corners in &self.corners {
+                if corners.iter().any(|&c| before[c as usize]) {
+                    corners.iter().for_each(|&c| near[c as usize] = true);
+                }
+            }
+        }
+        near
+    }
+
+    /// How many cells each point has.
+    pub fn valences(&self) -> Vec<u32> {
+        let mut valences = vec![0; self.points.len()];
+        self.corners.iter().flatten().for_each(|&c| valences[c as usize] += 1);
+        valences
+    }
+
+    /// The part made of some cells. A point with fewer cells here than `valences` says is held.
+    pub fn part(&self, cells: &[u32], valences: &[u32]) -> Part {
+        let mut local: HashMap<u32, u32> = HashMap::with_capacity(cells.len() / 4);
+        let mut points = Vec::new();
+        let corners: Vec<[u32; 4]> = (cells.iter())
+            .map(|&cell| {
+                self.corners[cell as usize].map(|corner| {
+                    *local.entry(corner).or_insert_with(|| {
+                        points.push(corner);
+                        points.len() as u32 - 1
+                    })
+                })
+            })
+            .collect();
+        let mut missing: Vec<u32> = points.iter().map(|&p| valences[p as usize]).collect();
+        corners.iter().flatten().for_each(|&c| missing[c as usize] -= 1);
+        let mut freedom: Vec<u8> = points.iter().map(|&p| self.freedom[p as usize]).collect();
+        let mut held = Vec::new();
+        for (point, &missing) in missing.iter().enumerate() {
+            if missing > 0 {
+                freedom[point] = 0;
+                held.push(point as u32);
+            }
+        }
+        let at = points.iter().map(|&p| self.points[p as usize]).collect();
+        let sides = points.iter().map(|&p| self.sides[p as usize]).collect();
+        Part { patch: Patch::new(at, freedom, sides, corners), points, held }
+    }
+
+    /// Takes the cells and points of parts back, in place of the cells that they were made of.
+    pub fn take_back(&mut self, parts: &[Part], divided: &[Vec<u32>]) {
+        divided.iter().flatten().for_each(|&cell| self.corners[cell as usize][0] = NONE);
+        let mut dead = divided.iter().flatten().copied();
+        for part in parts {
+            for (&point, at) in part.points.iter().zip(&part.patch.points) {
+                self.points[point as usize] = *at;
+            }
+            for cell in part.patch.cells() {
+                let corners = cell.map(|c| part.points[c as usize]);
+                match dead.next() {
+                    Some(slot) => self.corners[slot as usize] = corners,
+                    None => self.corners.push(corners),
+                }
+            }
+        }
+        self.corners.retain(|c| c[0] != NONE);
+    }
+}
+
+/// How many edges from held points the next pass looks.
+const LAYERS: usize = 3;
