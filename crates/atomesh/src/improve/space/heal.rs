@@ -104,8 +104,7 @@ pub(super) fn through_facet(patch: &Patch, cell: u32, k: usize) -> Option<[[u32;
         return None;
     }
     let corners = &patch.corners[cell as usize];
-    let back = (0..4).find(|&k| patch.neighbours[beyond as usize][k] == cell)?;
-    let (d, e) = (corners[k], patch.corners[beyond as usize][back]);
+    let (d, e) = (corners[k], patch.corners[beyond as usize][patch.back(cell, k)]);
     // (d, p, q, r) is positive: an odd place takes an odd number of exchanges to the front
     let [mut p, mut q] = [corners[(k + 1) & 3], corners[(k + 2) & 3]];
     let r = corners[(k + 3) & 3];

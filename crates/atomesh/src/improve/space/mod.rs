@@ -1,11 +1,13 @@
 //! Improving tetrahedra.
 
+mod align;
 mod heal;
 mod parts;
 mod patch;
 mod ring;
 mod shape;
 mod smooth;
+mod valley;
 
 use super::{ImproveError, ImproveOptions, ImproveReport, Improver};
 use crate::geometry::Bounds;
@@ -39,7 +41,7 @@ impl Improver<3> for Space {
             let expected = "an angle from 0 to 70 degrees";
             return Err(ImproveError::MinAngle { value: options.min_angle, expected });
         }
-        let _ = fields;
+        let valley = valley::Valley::new(fields.potential);
         let floor = (options.min_angle + MARGIN).to_radians().cos();
         let (points, corners) = mesh.into_parts();
         let Some(bounds) = Bounds::of(&points) else {
@@ -59,9 +61,20 @@ impl Improver<3> for Space {
             let valences = whole.valences();
             eprintln!("divide {:?} {} parts {} cells", t.elapsed(), divided.len(), divided.iter().map(|d|d.len()).sum::<usize>());
             let work = |cells: &Vec<u32>| {
-                let mut part = whole.part(cells, &valences);
+                let mut part = whole.part(cells, &valences, pending.as_deref());
                 let mut effort = Effort::default();
+                let t = std::time::Instant::now();
                 heal(&mut part.patch, floor, 6, &mut effort);
+                let t1 = t.elapsed();
+                let aligner = align::Aligner { valley: &valley, floor, stiffness: align::stiffness() };
+                let t=std::time::Instant::now(); let sweeps = std::env::var("SWEEPS").ok().and_then(|s| s.parse().ok()).unwrap_or(2);
+                for _ in 0..sweeps {
+                    if std::env::var("NOSWAP").is_err() { aligner.swap(&mut part.patch, &part.open, &mut effort); }
+                    if options.align == super::Align::Full { aligner.moves(&mut part.patch, &part.open, &mut effort); }
+                }
+                let t2 = t.elapsed();
+                heal(&mut part.patch, floor, 6, &mut effort);
+                if std::env::var("TIME").is_ok() { eprintln!("heal {t1:?} align {:?} heal {:?}", t2-t1, t.elapsed()-t2); }
                 (part, effort)
             };
             let done: Vec<(Part, Effort)> = divided.par_iter().map(work).collect();

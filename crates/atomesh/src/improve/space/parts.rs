@@ -10,7 +10,7 @@ use crate::geometry::{Bounds, Point};
 use std::collections::HashMap;
 
 /// The points of a part, about: enough that few are held, few enough for all cores and for a cache.
-const PART: usize = 6_000;
+const PART: usize = 12_000;
 
 /// Where each pass cuts: the share of the points before the cut.
 pub(super) const CUTS: [f64; 3] = [0.5, 0.3, 0.64];
@@ -29,6 +29,8 @@ pub(super) struct Part {
     pub points: Vec<u32>,
     /// Points of the patch that have cells elsewhere.
     pub held: Vec<u32>,
+    /// Which points of the patch no earlier pass has been free to move.
+    pub open: Vec<bool>,
 }
 
 /// The part of each point, and how many parts there are.
@@ -99,7 +101,7 @@ impl Whole {
     }
 
     /// The part made of some cells. A point with fewer cells here than `valences` says is held.
-    pub fn part(&self, cells: &[u32], valences: &[u32]) -> Part {
+    pub fn part(&self, cells: &[u32], valences: &[u32], pending: Option<&[bool]>) -> Part {
         let mut local: HashMap<u32, u32> = HashMap::with_capacity(cells.len() / 4);
         let mut points = Vec::new();
         let corners: Vec<[u32; 4]> = (cells.iter())
@@ -124,7 +126,8 @@ impl Whole {
         }
         let at = points.iter().map(|&p| self.points[p as usize]).collect();
         let sides = points.iter().map(|&p| self.sides[p as usize]).collect();
-        Part { patch: Patch::new(at, freedom, sides, corners), points, held }
+        let open = points.iter().map(|&p| pending.is_none_or(|open| open[p as usize])).collect();
+        Part { patch: Patch::new(at, freedom, sides, corners), points, held, open }
     }
 
     /// Takes the cells and points of parts back, in place of the cells that they were made of.
@@ -148,4 +151,4 @@ impl Whole {
 }
 
 /// How many edges from held points the next pass looks.
-const LAYERS: usize = 3;
+const LAYERS: usize = 2;

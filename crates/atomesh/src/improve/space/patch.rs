@@ -134,6 +134,44 @@ impl Patch {
         }
     }
 
+    /// The place of a cell's corner in the facet-neighbour beyond facet k, opposite the facet.
+    #[inline(always)]
+    pub fn back(&self, cell: u32, k: usize) -> usize {
+        let beyond = self.neighbours[cell as usize][k];
+        let neighbours = &self.neighbours[beyond as usize];
+        (0..3).find(|&k| neighbours[k] == cell).unwrap_or(3)
+    }
+
+    /// A cell that has an edge: the given one, if it still does, else one of the edge's points; `None` if the edge
+    /// is gone.
+    pub fn cell_with(&mut self, cell: u32, a: u32, b: u32) -> Option<u32> {
+        let has = |corners: &[u32; 4]| corners.contains(&a) && corners.contains(&b);
+        if has(&self.corners[cell as usize]) {
+            return Some(cell);
+        }
+        let mut star = Vec::with_capacity(40);
+        self.star(a, &mut star);
+        star.into_iter().find(|&cell| has(&self.corners[cell as usize]))
+    }
+
+    /// Calls `visit` once for every edge with a cell that has it, lesser point first.
+    pub fn each_edge(&mut self, mut visit: impl FnMut(&Self, u32, u32, u32)) {
+        let mut last = vec![NONE; self.points.len()];
+        let mut star = Vec::with_capacity(40);
+        for point in 0..self.points.len() as u32 {
+            star.clear();
+            self.star(point, &mut star);
+            for &cell in &star {
+                for other in self.corners[cell as usize] {
+                    if other > point && last[other as usize] != point {
+                        last[other as usize] = point;
+                        visit(self, cell, point, other);
+                    }
+                }
+            }
+        }
+    }
+
     /// Puts cells with the given corners in the place of others that fill the same space.
     pub fn replace(&mut self, old: &[u32], new: &[[u32; 4]]) {
         let mut facets = std::mem::take(&mut self.facets);

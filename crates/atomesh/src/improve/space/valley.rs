@@ -1,0 +1,247 @@
+//! The image along facets: the mean of b over a facet, and how far from it the valley's bottom is.
+
+use super::shape::cross;
+use crate::geometry::{Point, difference, dot};
+use crate::potential::ImagePotential;
+
+/// b between samples, linear along each axis whatever the atoms felt: only its value is wanted, often.
+pub(super) struct Valley<'a> {
+    samples: &'a [f32],
+    shape: [usize; 3],
+    scale: [f64; 3],
+    strides: [usize; 3],
+    /// The least step of the samples.
+    step: f64,
+}
+
+/// Barycentric weights of the places where a facet is sampled: their mean is exact for quadratics.
+const PLACES: [[f64; 3]; 3] = [
+    [2.0 / 3.0, 1.0 / 6.0, 1.0 / 6.0],
+    [1.0 / 6.0, 2.0 / 3.0, 1.0 / 6.0],
+    [1.0 / 6.0, 1.0 / 6.0, 2.0 / 3.0],
+];
+
+/// A place between three points.
+#[inline(always)]
+fn between(p: &[Point<3>; 3], w: &[f64; 3]) -> Point<3> {
+    std::array::from_fn(|k| w[0] * p[0][k] + w[1] * p[1][k] + w[2] * p[2][k])
+}
+
+impl<'a> Valley<'a> {
+    pub fn new(potential: &'a ImagePotential<3>) -> Self {
+        let grid = potential.grid();
+        let shape = grid.shape;
+        Self {
+            samples: potential.samples(),
+            shape,
+            scale: grid.step.map(|step| 1.0 / step),
+            strides: [1, shape[0], shape[0] * shape[1]],
+            step: grid.least_step(),
+        }
+    }
+
+    /// How deep the valley is at a point: −b, but nothing where b repels.
+    #[inline(always)]
+    pub fn depth(&self, p: &Point<3>) -> f64 {
+        let mut base = 0;
+        let mut t = [0.0_f32; 3];
+        let mut next = [0; 3];
+        for k in 0..3 {
+            let s = p[k] * self.scale[k];
+            let i = (s as usize).min(self.shape[k].saturating_sub(2));
+            t[k] = ((s - i as f64) as f32).clamp(0.0, 1.0);
+            base += i * self.strides[k];
+            next[k] = if self.shape[k] > 1 { self.strides[k] } else { 0 };
+        }
+        let row = |at: usize| {
+            let (a, b) = (self.samples[at], self.samples[at + next[0]]);
+            a + t[0] * (b - a)
+        };
+        let page = |at: usize| {
+            let (a, b) = (row(at), row(at + next[1]));
+            a + t[1] * (b - a)
+        };
+        let (a, b) = (page(base), page(base + next[2]));
+        f64::from(-(a + t[2] * (b - a))).max(0.0)
+    }
+
+    /// The mean depth along a facet.
+    #[inline(always)]
+    fn mean(&self, facet: &[Point<3>; 3]) -> f64 {
+        PLACES.iter().map(|w| self.depth(&between(facet, w))).sum::<f64>() / PLACES.len() as f64
+    }
+
+    /// The mean depth along a facet, whose depths widen a contrast.
+    #[inline(always)]
+    pub fn mean_of(&self, facet: &[Point<3>; 3], contrast: &mut Contrast) -> f64 {
+        let depths = PLACES.map(|w| self.depth(&between(facet, &w)));
+        depths.iter().for_each(|&depth| contrast.include(depth));
+        depths.iter().sum::<f64>() / PLACES.len() as f64
+    }
+
+    /// What a facet is worth: its area times the square of its mean depth, which prefers one facet within a valley
+    /// to two that cross it.
+    #[inline(always)]
+    pub fn worth(&self, facet: &[Point<3>; 3], contrast: &Contrast) -> f64 {
+        worth(facet, self.mean(facet), contrast)
+    }
+
+    /// Adds to a least-squares system for the move of the facet's first corner: along the facet's normal, the
+    /// places where it is sampled are to come to the valley's bottom, each moving by its share of the corner's move.
+    pub fn pull(&self, facet: &[Point<3>; 3], mean: f64, contrast: &Contrast, system: &mut System) {
+        let mean = contrast.of(mean);
+        let normal = normal(facet);
+        let length = dot(&normal, &normal).sqrt();
+        if mean < LEAST_MEAN || length == 0.0 {
+            return;
+        }
+        let normal = normal.map(|x| x / length);
+        for w in &PLACES {
+            let at = between(facet, w);
+            let (offset, depth) = self.bottom(&at, &normal);
+            system.add(&normal, w[0], offset, 0.5 * length * mean * mean * contrast.of(depth));
+        }
+    }
+
+    /// The move from a point straight down the slope to the valley's bottom, at most `reach` away.
+    pub fn fall(&self, p: &Point<3>, reach: f64) -> Option<Point<3>> {
+        let h = 0.5 * self.step;
+        let slope: Point<3> = std::array::from_fn(|k| {
+            let (mut low, mut high) = (*p, *p);
+            low[k] -= h;
+            high[k] += h;
+            self.depth(&high) - self.depth(&low)
+        });
+        let length = dot(&slope, &slope).sqrt();
+        if length < 1e-3 {
+            return None;
+        }
+        let along = slope.map(|x| x / length);
+        let depth_at = |offset: f64| self.depth(&std::array::from_fn(|k| p[k] + offset * along[k]));
+        let (mut before, mut here, mut offset) = (depth_at(0.0), depth_at(self.step), self.step);
+        if here <= before {
+            return None;
+        }
+        while offset < reach {
+            let after = depth_at(offset + self.step);
+            if after <= here {
+                let bend = before - 2.0 * here + after;
+                let shift = if bend < 0.0 { 0.5 * (before - after) / bend } else { 0.0 };
+                offset += self.step * shift.clamp(-0.5, 0.5);
+                return Some(along.map(|x| offset * x));
+            }
+            (before, here, offset) = (here, after, offset + self.step);
+        }
+        None
+    }
+
+    /// The offset along a direction, within two steps, at which the valley is deepest, and its depth there.
+    pub fn bottom(&self, p: &Point<3>, direction: &Point<3>) -> (f64, f64) {
+        let mut depths = [0.0; 5];
+        for (n, depth) in depths.iter_mut().enumerate() {
+            let offset = (n as f64 - 2.0) * self.step;
+            *depth = self.depth(&std::array::from_fn(|k| p[k] + offset * direction[k]));
+        }
+        let deepest = (0..5).fold(2, |best, n| if depths[n] > depths[best] { n } else { best });
+        let mut offset = deepest as f64 - 2.0;
+        if (1..4).contains(&deepest) {
+            let (a, b, c) = (depths[deepest - 1], depths[deepest], depths[deepest + 1]);
+            let bend = a - 2.0 * b + c;
+            if bend < 0.0 {
+                offset += (0.5 * (a - c) / bend).clamp(-0.5, 0.5);
+            }
+        }
+        (offset * self.step, depths[deepest])
+    }
+}
+
+/// Twice the area of a facet, along its normal.
+#[inline(always)]
+fn normal(facet: &[Point<3>; 3]) -> Point<3> {
+    cross(&difference(&facet[1], &facet[0]), &difference(&facet[2], &facet[0]))
+}
+
+/// See [`Valley::worth`].
+#[inline(always)]
+pub(super) fn worth(facet: &[Point<3>; 3], mean: f64, contrast: &Contrast) -> f64 {
+    let mean = contrast.of(mean);
+    let normal = normal(facet);
+    0.5 * dot(&normal, &normal).sqrt() * mean * mean
+}
+
+/// Facets of a lesser mean, between the least and the greatest depth around, are not drawn to a valley.
+const LEAST_MEAN: f64 = 0.3;
+
+/// Where no place is deeper there is no feature.
+pub(super) const LEAST_DEPTH: f64 = 0.2;
+
+/// The least and the greatest depth around a place: weak features count as much as strong ones elsewhere.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct Contrast {
+    pub low: f64,
+    pub high: f64,
+}
+
+impl Contrast {
+    pub const NONE: Self = Self { low: f64::INFINITY, high: 0.0 };
+
+    pub fn include(&mut self, depth: f64) {
+        (self.low, self.high) = (self.low.min(depth), self.high.max(depth));
+    }
+
+    /// A depth between the least, 0, and the greatest, 1.
+    #[inline(always)]
+    pub fn of(&self, depth: f64) -> f64 {
+        ((depth - self.low) / (self.high - self.low).max(0.15)).max(0.0)
+    }
+}
+
+/// The normal equations of a least-squares fit of one point's move.
+#[derive(Clone, Copy, Debug, Default)]
+pub(super) struct System {
+    matrix: [[f64; 3]; 3],
+    right: [f64; 3],
+    weight: f64,
+}
+
+impl System {
+    /// Adds the wish that `share` of the move, along a unit vector, be `offset`.
+    #[inline]
+    fn add(&mut self, along: &Point<3>, share: f64, offset: f64, weight: f64) {
+        for r in 0..3 {
+            for c in 0..3 {
+                self.matrix[r][c] += weight * share * share * along[r] * along[c];
+            }
+            self.right[r] += weight * share * offset * along[r];
+        }
+        self.weight += weight * share * share;
+    }
+
+    /// The move, damped where wishes say nothing; along axes of `freedom` only.
+    pub fn solve(&self, freedom: u8) -> Option<Point<3>> {
+        if self.weight == 0.0 {
+            return None;
+        }
+        let mut a = self.matrix;
+        let mut right = self.right;
+        for k in 0..3 {
+            a[k][k] += DAMPING * self.weight;
+            if freedom >> k & 1 == 0 {
+                for j in 0..3 {
+                    (a[k][j], a[j][k]) = (0.0, 0.0);
+                }
+                (a[k][k], right[k]) = (1.0, 0.0);
+            }
+        }
+        // Cramer's rule: the damping keeps the matrix far from singular
+        let c = [cross(&a[1], &a[2]), cross(&a[2], &a[0]), cross(&a[0], &a[1])];
+        let determinant = dot(&a[0], &c[0]);
+        let x: Point<3> = std::array::from_fn(|k| {
+            (right[0] * c[0][k] + right[1] * c[1][k] + right[2] * c[2][k]) / determinant
+        });
+        x.iter().all(|x| x.is_finite()).then_some(x)
+    }
+}
+
+/// The share of the wishes' weight that keeps a point where it is.
+const DAMPING: f64 = 0.05;
