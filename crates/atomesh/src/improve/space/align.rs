@@ -17,18 +17,28 @@ pub(super) fn stiffness() -> f64 { std::env::var("STIFF").ok().and_then(|s| s.pa
 const GAIN: f64 = 1e-3;
 /// What a move must gain, and the share of the edges' length that it must go.
 const LEAST_GAIN: f64 = 1e-5;
-const LEAST_MOVE: f64 = 0.01;
+const LEAST_MOVE: f64 = 0.002;
+const FINE: f64 = 0.05;
+const FINE_LOSS: f64 = 0.02;
 /// How far a point falls into a valley, in the edges' length.
 const REACH: f64 = 0.5;
 /// A valley crosses an edge where it is deeper than at both ends by this.
 const DEEPER: f64 = 0.05;
 
+/// Where on an edge valleys are looked for.
+const SHARES: [f64; 5] = [0.17, 0.33, 0.5, 0.67, 0.83];
+/// A point this deep, between the least and the greatest depth around, may be a corner of a facet in the valley.
+fn near() -> f64 { static N: std::sync::LazyLock<f64> = std::sync::LazyLock::new(|| std::env::var("NEAR").ok().and_then(|s| s.parse().ok()).unwrap_or(0.2)); *N }
+
+fn own() -> f64 { static N: std::sync::LazyLock<f64> = std::sync::LazyLock::new(|| std::env::var("OWN").ok().and_then(|s| s.parse().ok()).unwrap_or(1.0)); *N }
 /// What alignment works with.
 pub(super) struct Aligner<'a> {
     pub valley: &'a Valley<'a>,
     /// The greatest cosine that swaps and moves may leave.
     pub floor: f64,
     pub stiffness: f64,
+    /// The depth at each point of the patch.
+    pub depths: Vec<f64>,
 }
 
 /// By what facets are measured in one place: over the square of a length, between two depths.
@@ -57,38 +67,35 @@ impl Aligner<'_> {
 
     /// Takes out edges that a valley crosses between their ends, and puts edges that lie in one through facets.
     pub fn swap(&self, patch: &mut Patch, open: &[bool], effort: &mut Effort) {
-        let depths: Vec<f64> = patch.points.iter().map(|p| self.valley.depth(p)).collect();
-        for [cell, a, b] in self.crossed_edges(patch, open, &depths) {
+        for (cell, a, b, depth) in self.crossed_edges(patch, open) {
             if let Some(cell) = patch.cell_with(cell, a, b) {
                 let (i, j) = (patch.place(cell, a), patch.place(cell, b));
-                effort.swaps += usize::from(self.swap_edge(patch, cell, i, j, &depths));
+                effort.swaps += usize::from(self.swap_edge(patch, cell, [i, j], depth));
             }
         }
         for cell in 0..patch.slot_count() {
             for k in 0..4 {
-                if patch.is_alive(cell) && self.is_passed(patch, cell, k, open, &depths) {
-                    effort.swaps += usize::from(self.swap_facet(patch, cell, k, &depths));
+                if patch.is_alive(cell) && self.is_passed(patch, cell, k, open) {
+                    effort.swaps += usize::from(self.swap_facet(patch, cell, k));
                 }
             }
         }
     }
 
-    /// The edges that a valley crosses between their ends, each with a cell that has it.
-    fn crossed_edges(&self, patch: &mut Patch, open: &[bool], depths: &[f64]) -> Vec<[u32; 3]> {
+    /// The edges that a valley crosses between their ends, each with a cell that has it and the depth there.
+    fn crossed_edges(&self, patch: &mut Patch, open: &[bool]) -> Vec<(u32, u32, u32, f64)> {
         let mut edges = Vec::new();
         patch.each_edge(|patch, cell, a, b| {
-            let ends = depths[a as usize].max(depths[b as usize]) + DEEPER;
-            let is_open = open[a as usize] || open[b as usize];
-            if is_open && self.is_crossed(patch, a, b, ends.max(LEAST_DEPTH)) {
-                edges.push([cell, a, b]);
+            if open[a as usize] || open[b as usize] {
+                let ends = self.depths[a as usize].max(self.depths[b as usize]);
+                let depth = SHARES.map(|share| self.on_way(patch, a, b, share)).into_iter();
+                let depth = depth.fold(0.0, f64::max);
+                if depth > (ends + DEEPER).max(LEAST_DEPTH) {
+                    edges.push((cell, a, b, depth));
+                }
             }
         });
         edges
-    }
-
-    /// Whether some place between two points is deeper than `depth`.
-    fn is_crossed(&self, patch: &Patch, a: u32, b: u32, depth: f64) -> bool {
-        [0.5, 0.33, 0.67].iter().any(|&share| self.on_way(patch, a, b, share) > depth)
     }
 
     /// The depth at a share of the way from a to b.
@@ -99,7 +106,8 @@ impl Aligner<'_> {
     }
 
     /// Whether the points on both sides of a facet lie in one valley.
-    fn is_passed(&self, patch: &Patch, cell: u32, k: usize, open: &[bool], depths: &[f64]) -> bool {
+    fn is_passed(&self, patch: &Patch, cell: u32, k: usize, open: &[bool]) -> bool {
+        let depths = &self.depths;
         let d = patch.corners[cell as usize][k];
         let beyond = patch.neighbours[cell as usize][k];
         if beyond == NONE || beyond < cell || depths[d as usize] < LEAST_DEPTH {
@@ -107,19 +115,23 @@ impl Aligner<'_> {
         }
         let e = patch.corners[beyond as usize][patch.back(cell, k)];
         let ends = 0.5 * (depths[d as usize] + depths[e as usize]);
+        let is_near = |k: usize| depths[patch.corners[cell as usize][k] as usize] > 0.6 * ends;
         (open[d as usize] || open[e as usize])
             && depths[e as usize] >= LEAST_DEPTH
+            && (1..4).any(|n| is_near((k + n) & 3))
             && self.on_way(patch, d, e, 0.5) > 0.8 * ends
     }
 
-    fn swap_edge(&self, patch: &mut Patch, cell: u32, i: usize, j: usize, depths: &[f64]) -> bool {
+    fn swap_edge(&self, patch: &mut Patch, cell: u32, [i, j]: [usize; 2], depth: f64) -> bool {
         let Some(ring) = Ring::around(patch, cell, i, j) else { return false };
         let [a, b] = ring.ends;
         let mut contrast = Contrast::NONE;
         let around = ring.points[..ring.count].iter().chain(&ring.ends);
-        around.for_each(|&p| contrast.include(depths[p as usize]));
-        for share in [0.33, 0.5, 0.67] {
-            contrast.include(self.on_way(patch, a, b, share));
+        around.for_each(|&p| contrast.include(self.depths[p as usize]));
+        contrast.include(depth);
+        let is_near = |p: &&u32| contrast.of(self.depths[**p as usize]) > near();
+        if ring.points[..ring.count].iter().filter(is_near).count() < 3 {
+            return false;
         }
         let scale = &Scale { area: 1.0 / size_squared(patch, &ring), contrast };
         let facets = ring.points[..ring.count].iter().map(|&p| self.facet(patch, [a, b, p], scale));
@@ -148,7 +160,7 @@ impl Aligner<'_> {
         }
     }
 
-    fn swap_facet(&self, patch: &mut Patch, cell: u32, k: usize, depths: &[f64]) -> bool {
+    fn swap_facet(&self, patch: &mut Patch, cell: u32, k: usize) -> bool {
         let Some(cells) = through_facet(patch, cell, k) else { return false };
         let cost: f64 = cells.iter().map(|corners| self.cost(patch, corners)).sum();
         if cost == f64::INFINITY {
@@ -158,7 +170,7 @@ impl Aligner<'_> {
         let at = |point: u32| &patch.points[point as usize];
         let edges = [p, q, r].map(|x| distance_squared(at(x), at(d)) + distance_squared(at(x), at(e)));
         let mut contrast = Contrast::NONE;
-        [p, q, r, d, e].iter().for_each(|&p| contrast.include(depths[p as usize]));
+        [p, q, r, d, e].iter().for_each(|&p| contrast.include(self.depths[p as usize]));
         contrast.include(self.on_way(patch, d, e, 0.5));
         let scale = &Scale { area: 6.0 / edges.iter().sum::<f64>(), contrast };
         let facets = [p, q, r].map(|x| self.facet(patch, [d, e, x], scale));
@@ -173,7 +185,7 @@ impl Aligner<'_> {
     }
 
     /// Moves points near valleys so that their facets come onto them.
-    pub fn moves(&self, patch: &mut Patch, open: &[bool], effort: &mut Effort) {
+    pub fn moves(&mut self, patch: &mut Patch, open: &[bool], effort: &mut Effort) {
         let mut room = Room::default();
         for point in 0..patch.points.len() as u32 {
             if patch.freedom[point as usize] != 0 && open[point as usize] {
@@ -182,29 +194,38 @@ impl Aligner<'_> {
         }
     }
 
-    fn move_point(&self, patch: &mut Patch, point: u32, room: &mut Room) -> bool {
+    fn move_point(&mut self, patch: &mut Patch, point: u32, room: &mut Room) -> bool {
         room.gather(patch, point);
         let at = patch.points[point as usize];
         let mut contrast = Contrast::NONE;
-        contrast.include(self.valley.depth(&at));
-        for rim in &mut room.rims {
-            rim.mean = self.valley.mean_of(&[at, rim.ends[0], rim.ends[1]], &mut contrast);
-        }
+        let corners = room.star.iter().flat_map(|&cell| patch.corners[cell as usize]);
+        corners.for_each(|c| contrast.include(self.depths[c as usize]));
         if contrast.high < LEAST_DEPTH {
             return false;
+        }
+        let is_near = |point: u32| contrast.of(self.depths[point as usize]) > near();
+        room.find_rims(patch, point, is_near);
+        if room.rims.len() < 2 {
+            return false;
+        }
+        room.means.clear();
+        for rim in &room.rims {
+            let mean = self.valley.mean_of(&[at, rim[0], rim[1]], &mut contrast);
+            room.means.push(mean);
         }
         let freedom = patch.freedom[point as usize];
         let size = room.size_squared(&at);
         let mut system = System::default();
         let scale = Scale { area: 1.0 / size, contrast };
-        let (mut now, mut worst) = (0.0, -1.0_f64);
-        for rim in &room.rims {
-            let facet = [at, rim.ends[0], rim.ends[1]];
-            self.valley.pull(&facet, rim.mean, &contrast, &mut system);
-            now += scale.area * worth(&facet, rim.mean, &contrast);
+        let (mut now, mut worst) = (own() * contrast.of(self.depths[point as usize]).powi(2), -1.0_f64);
+        for (rim, mean) in room.rims.iter().zip(&room.means) {
+            let facet = [at, rim[0], rim[1]];
+            self.valley.pull(&facet, *mean, &contrast, &mut system);
+            now += scale.area * worth(&facet, *mean, &contrast);
         }
+        let mut cost_now = 0.0;
         for &cell in &room.star {
-            now -= self.cost_now(patch, cell);
+            cost_now += self.cost_now(patch, cell);
             worst = worst.max(patch.shapes[cell as usize].cosine);
         }
         let limit = self.floor.max(worst);
@@ -214,15 +235,23 @@ impl Aligner<'_> {
             (0..3).filter(|k| freedom >> k & 1 == 0).for_each(|k| shift[k] = 0.0);
             Some((shift, [1.0, 0.6]))
         };
-        for n in 0..2 {
+        for n in 0..(if std::env::var("NOFALL").is_ok() {1} else {2}) {
             let Some((shift, shares)) = (if n == 0 { fitted } else { fallen() }) else { continue };
             if shift.iter().map(|x| x * x).sum::<f64>() < LEAST_MOVE * LEAST_MOVE * size {
                 continue;
             }
+            let is_fine = n == 0 && std::env::var("NOFINE").is_err() && shift.iter().map(|x| x * x).sum::<f64>() < FINE * FINE * size;
             for share in shares {
                 let to = std::array::from_fn(|k| at[k] + share * shift[k]);
-                if self.energy(room, &to, &scale, limit) > now + LEAST_GAIN {
+                let Some(cost) = self.cost_at(room, &to, limit) else { continue };
+                let is_better = if is_fine {
+                    cost < cost_now + FINE_LOSS
+                } else {
+                    self.worth_at(room, &to, &scale) - cost > now - cost_now + LEAST_GAIN
+                };
+                if is_better {
                     patch.move_point(point, to, &room.star);
+                    self.depths[point as usize] = self.valley.depth(&to);
                     return true;
                 }
             }
@@ -230,21 +259,26 @@ impl Aligner<'_> {
         false
     }
 
-    /// The worth of a point's facets less the cost of its cells; less than anything if a cosine is above `limit`.
-    fn energy(&self, room: &Room, at: &Point<3>, scale: &Scale, limit: f64) -> f64 {
+    /// The cost of a point's cells if it were elsewhere; `None` if a cosine were above `limit`.
+    fn cost_at(&self, room: &Room, at: &Point<3>, limit: f64) -> Option<f64> {
         let mut sum = 0.0;
         for [p, q, r] in &room.facing {
             let shape = shape(p, q, r, at);
             if shape.cosine > limit {
-                return f64::NEG_INFINITY;
+                return None;
             }
-            sum -= self.stiffness * (1.0 - shape.quality);
+            sum += self.stiffness * (1.0 - shape.quality);
         }
-        for rim in &room.rims {
-            let facet = [*at, rim.ends[0], rim.ends[1]];
-            sum += scale.area * self.valley.worth(&facet, &scale.contrast);
-        }
-        sum
+        Some(sum)
+    }
+
+    /// The worth of a point's facets, and of its own place, if it were elsewhere.
+    fn worth_at(&self, room: &Room, at: &Point<3>, scale: &Scale) -> f64 {
+        let facets = room.rims.iter().map(|rim| {
+            let facet = [*at, rim[0], rim[1]];
+            scale.area * self.valley.worth(&facet, &scale.contrast)
+        });
+        own() * scale.contrast.of(self.valley.depth(at)).powi(2) + facets.sum::<f64>()
     }
 }
 
@@ -257,38 +291,40 @@ fn size_squared(patch: &Patch, ring: &Ring) -> f64 {
     around.sum::<f64>() / (2 * ring.count) as f64
 }
 
-/// A facet of a point: its far edge, and the mean depth along it.
-struct Rim {
-    ends: [Point<3>; 2],
-    mean: f64,
-}
-
 /// What lies around one point.
 #[derive(Default)]
 struct Room {
     star: Vec<u32>,
     /// The facets of its cells opposite it.
     facing: Vec<[Point<3>; 3]>,
-    /// Its own facets, those of the hull apart.
-    rims: Vec<Rim>,
+    /// The far edges of its own facets, where they lie in a valley.
+    rims: Vec<[Point<3>; 2]>,
+    /// The mean depths along these.
+    means: Vec<f64>,
 }
 
 impl Room {
     fn gather(&mut self, patch: &mut Patch, point: u32) {
         self.star.clear();
+        patch.star(point, &mut self.star);
+    }
+
+    /// Finds the facets around the point, and of its own those whose far corners are near a valley.
+    fn find_rims(&mut self, patch: &Patch, point: u32, is_near: impl Fn(u32) -> bool) {
         self.facing.clear();
         self.rims.clear();
-        patch.star(point, &mut self.star);
         for &cell in &self.star {
             self.facing.push(facing(patch, cell, point));
             let corners = &patch.corners[cell as usize];
             let k = patch.place(cell, point);
             for n in 1..4 {
                 let beyond = patch.neighbours[cell as usize][(k + n) & 3];
-                // each facet from one side
+                // each facet from one side, none of the hull
                 if beyond != NONE && beyond > cell {
                     let ends = [n % 3 + 1, (n + 1) % 3 + 1].map(|m| corners[(k + m) & 3]);
-                    self.rims.push(Rim { ends: ends.map(|c| patch.points[c as usize]), mean: 0.0 });
+                    if is_near(ends[0]) && is_near(ends[1]) {
+                        self.rims.push(ends.map(|c| patch.points[c as usize]));
+                    }
                 }
             }
         }

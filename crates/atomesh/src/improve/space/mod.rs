@@ -66,7 +66,8 @@ impl Improver<3> for Space {
                 let t = std::time::Instant::now();
                 heal(&mut part.patch, floor, 6, &mut effort);
                 let t1 = t.elapsed();
-                let aligner = align::Aligner { valley: &valley, floor, stiffness: align::stiffness() };
+                let depths = part.patch.points.iter().map(|p| valley.depth(p)).collect();
+                let mut aligner = align::Aligner { valley: &valley, floor, stiffness: align::stiffness(), depths };
                 let t=std::time::Instant::now(); let sweeps = std::env::var("SWEEPS").ok().and_then(|s| s.parse().ok()).unwrap_or(2);
                 for _ in 0..sweeps {
                     if std::env::var("NOSWAP").is_err() { aligner.swap(&mut part.patch, &part.open, &mut effort); }

@@ -67,7 +67,7 @@ impl<'a> Valley<'a> {
 
     /// The mean depth along a facet.
     #[inline(always)]
-    fn mean(&self, facet: &[Point<3>; 3]) -> f64 {
+    pub fn mean(&self, facet: &[Point<3>; 3]) -> f64 {
         PLACES.iter().map(|w| self.depth(&between(facet, w))).sum::<f64>() / PLACES.len() as f64
     }
 
@@ -96,11 +96,19 @@ impl<'a> Valley<'a> {
             return;
         }
         let normal = normal.map(|x| x / length);
-        for w in &PLACES {
-            let at = between(facet, w);
-            let (offset, depth) = self.bottom(&at, &normal);
-            system.add(&normal, w[0], offset, 0.5 * length * mean * mean * contrast.of(depth));
+        let bottoms = PLACES.map(|w| self.bottom(&between(facet, &w), &normal, contrast));
+        if bottoms.iter().any(|bottom| bottom.variance == 0.0) {
+            return; // the valley runs through the facet, not along it
         }
+        let mut spread = 0.0;
+        for (w, bottom) in PLACES.iter().zip(&bottoms) {
+            let weight = 0.5 * length * mean * mean * contrast.of(bottom.depth);
+            system.add(&normal, w[0], bottom.offset, weight);
+            spread += weight * bottom.variance;
+        }
+        // the area's gradient is half the far edge turned by a right angle; ∂A weighs as A does
+        let growth = cross(&difference(&facet[2], &facet[1]), &normal);
+        system.grow(&normal, &growth.map(|x| -0.5 * x * spread / length));
     }
 
     /// The move from a point straight down the slope to the valley's bottom, at most `reach` away.
@@ -135,8 +143,8 @@ impl<'a> Valley<'a> {
         None
     }
 
-    /// The offset along a direction, within two steps, at which the valley is deepest, and its depth there.
-    pub fn bottom(&self, p: &Point<3>, direction: &Point<3>) -> (f64, f64) {
+    /// The deepest place along a direction, within two steps.
+    fn bottom(&self, p: &Point<3>, direction: &Point<3>, contrast: &Contrast) -> Bottom {
         let mut depths = [0.0; 5];
         for (n, depth) in depths.iter_mut().enumerate() {
             let offset = (n as f64 - 2.0) * self.step;
@@ -151,8 +159,21 @@ impl<'a> Valley<'a> {
                 offset += (0.5 * (a - c) / bend).clamp(-0.5, 0.5);
             }
         }
-        (offset * self.step, depths[deepest])
+        // of a Gaussian, two steps to both sides of its middle
+        let ratio = 2.0 * contrast.of(depths[deepest]) / (contrast.of(depths[0]) + contrast.of(depths[4]));
+        let variance = if ratio > 1.6 { 2.0 / ratio.min(50.0).ln() } else { 0.0 };
+        let step = self.step;
+        Bottom { offset: offset * step, depth: depths[deepest], variance: variance * step * step }
     }
+}
+
+/// The bottom of a valley along a line.
+struct Bottom {
+    /// How far it is.
+    offset: f64,
+    depth: f64,
+    /// The square of the valley's width, as that of a Gaussian; 0 if it is not seen.
+    variance: f64,
 }
 
 /// Twice the area of a facet, along its normal.
@@ -166,11 +187,14 @@ fn normal(facet: &[Point<3>; 3]) -> Point<3> {
 pub(super) fn worth(facet: &[Point<3>; 3], mean: f64, contrast: &Contrast) -> f64 {
     let mean = contrast.of(mean);
     let normal = normal(facet);
-    0.5 * dot(&normal, &normal).sqrt() * mean * mean
+    0.5 * dot(&normal, &normal).sqrt() * (mean * mean).powi(2)
 }
 
 /// Facets of a lesser mean, between the least and the greatest depth around, are not drawn to a valley.
 const LEAST_MEAN: f64 = 0.3;
+
+/// Facets of a greater mean lie in a valley.
+const WITHIN: f64 = 0.7;
 
 /// Where no place is deeper there is no feature.
 pub(super) const LEAST_DEPTH: f64 = 0.2;
@@ -202,9 +226,15 @@ pub(super) struct System {
     matrix: [[f64; 3]; 3],
     right: [f64; 3],
     weight: f64,
+    /// The facets' normals, all to one side, and how their areas grow.
+    normal: Point<3>,
+    growth: Point<3>,
+    count: f64,
 }
 
 impl System {
+    pub fn debug(&self) -> f64 { let q = dot(&self.normal,&self.normal); if q > 0.9*self.count*self.count { dot(&self.growth, &self.normal)/q.sqrt()/self.weight } else { -q/(self.count*self.count) } }
+
     /// Adds the wish that `share` of the move, along a unit vector, be `offset`.
     #[inline]
     fn add(&mut self, along: &Point<3>, share: f64, offset: f64, weight: f64) {
@@ -217,6 +247,17 @@ impl System {
         self.weight += weight * share * share;
     }
 
+    /// Adds how a facet's worth grows with its area.
+    #[inline]
+    fn grow(&mut self, normal: &Point<3>, growth: &Point<3>) {
+        self.count += 1.0;
+        let sign = if dot(&self.normal, normal) < 0.0 { -1.0 } else { 1.0 };
+        for k in 0..3 {
+            self.normal[k] += sign * normal[k];
+            self.growth[k] += growth[k];
+        }
+    }
+
     /// The move, damped where wishes say nothing; along axes of `freedom` only.
     pub fn solve(&self, freedom: u8) -> Option<Point<3>> {
         if self.weight == 0.0 {
@@ -224,6 +265,11 @@ impl System {
         }
         let mut a = self.matrix;
         let mut right = self.right;
+        let square = dot(&self.normal, &self.normal);
+        let lift = dot(&self.growth, &self.normal) / square;
+        if square > 0.9 * self.count * self.count && lift.is_finite() && std::env::var("NOLIFT").is_err() {
+            (0..3).for_each(|k| right[k] += lift * self.normal[k]);
+        }
         for k in 0..3 {
             a[k][k] += DAMPING * self.weight;
             if freedom >> k & 1 == 0 {
