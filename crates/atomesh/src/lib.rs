@@ -18,6 +18,7 @@ pub mod distance;
 pub mod potential;
 pub mod lattice;
 pub mod optimize;
+pub mod valley;
 pub mod improve;
 pub mod edit;
 pub mod features;

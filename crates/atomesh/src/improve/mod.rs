@@ -8,8 +8,10 @@
 //! [`Improver`] is the contract; each dimension has its own. Points are never added or taken away; points
 //! without freedom stay, others stay on the side of the box that they lie on.
 
+mod plane;
 mod space;
 
+pub use plane::PlaneImprover;
 pub use space::Space;
 
 use crate::mesh::{Mesh, MeshError};
@@ -43,6 +45,20 @@ impl ImproveOptions {
     /// The defaults for images of a dimension: a floor of 20° in 2-D, of 15° in 3-D.
     pub fn for_dimension(dimension: usize) -> Self {
         Self { align: Align::default(), min_angle: if dimension == 2 { 20.0 } else { 15.0 } }
+    }
+
+    /// Checks the floor: 0 or more, and below the angles of the regular triangle, 60°, or tetrahedron, 70.5°.
+    ///
+    /// # Errors
+    /// [`ImproveError::MinAngle`].
+    pub fn validate(&self, dimension: usize) -> Result<(), ImproveError> {
+        let (value, below) = (self.min_angle, if dimension == 2 { 60.0 } else { 70.5 });
+        if (0.0..below).contains(&value) {
+            return Ok(());
+        }
+        let expected =
+            if dimension == 2 { "0 or more, below 60" } else { "0 or more, below 70.5" };
+        Err(ImproveError::MinAngle { value, expected })
     }
 }
 

@@ -92,6 +92,7 @@ pub fn prepare<'m, const D: usize>(
     let frame = *inputs.image.frame();
     let grid = frame.grid(options.units);
     options.optimize.validate()?;
+    options.improve.validate(D)?;
     if let Some(axis) = (0..D).find(|&k| grid.shape[k] < 2) {
         return Err(PipelineError::Thin { axis });
     }

@@ -1,0 +1,194 @@
+//! Triangles that can be swapped: who is beside whom, and which guides lie in which.
+
+use crate::geometry::Point;
+use crate::mesh::{Mesh, MeshError};
+
+use super::energy::doubled_area;
+use super::guides::Guide;
+
+/// No cell: beyond the hull.
+pub(super) const NONE: u32 = u32::MAX;
+
+/// Triangles, counter-clockwise.
+pub(super) struct Triangles {
+    pub points: Vec<Point<2>>,
+    corners: Vec<[u32; 3]>,
+    /// The cell across from each corner.
+    neighbours: Vec<[u32; 3]>,
+    /// A cell of each point.
+    cell_of: Vec<u32>,
+    /// The guides in each cell.
+    guides: Vec<Vec<u32>>,
+}
+
+impl Triangles {
+    /// The cells of a mesh without fault, and the guides in them.
+    pub fn new(mesh: Mesh<2>, guides: &[Guide]) -> Self {
+        let mut neighbours = vec![[NONE; 3]; mesh.cell_count()];
+        for facet in mesh.facets() {
+            let Some(neighbour) = facet.neighbour else { continue };
+            for (cell, other) in [(facet.cell, neighbour), (neighbour, facet.cell)] {
+                let corners = &mesh.corners()[3 * cell as usize..][..3];
+                let off = corners.iter().position(|c| !facet.corners.contains(c));
+                neighbours[cell as usize][off.expect("a facet leaves out one corner")] = other;
+            }
+        }
+        let (points, corners) = mesh.into_parts();
+        let corners = corners.as_chunks::<3>().0.to_vec();
+        let mut cell_of = vec![NONE; points.len()];
+        for (cell, corners) in corners.iter().enumerate() {
+            corners.iter().for_each(|&c| cell_of[c as usize] = cell as u32);
+        }
+        let empty = vec![Vec::new(); corners.len()];
+        let mut triangles = Self { points, corners, neighbours, cell_of, guides: empty };
+        let mut cell = 0;
+        for (i, guide) in guides.iter().enumerate() {
+            cell = triangles.locate(guide.position, cell);
+            triangles.guides[cell as usize].push(i as u32);
+        }
+        triangles
+    }
+
+    /// The cell that holds a point of the box: a walk from `start`, each time across the side that the point
+    /// is farthest beyond. Among Delaunay's cells it ends; among others it ends somewhere.
+    fn locate(&self, p: Point<2>, start: u32) -> u32 {
+        let mut cell = start;
+        for _ in 0..self.corners.len() {
+            let corners = self.corners_at(cell);
+            let sides = [0, 1, 2].map(|k| doubled_area(corners[(k + 1) % 3], corners[(k + 2) % 3], p));
+            let beyond = (0..3).min_by(|&i, &j| sides[i].total_cmp(&sides[j])).expect("three sides");
+            let next = self.neighbours[cell as usize][beyond];
+            if sides[beyond] >= 0.0 || next == NONE {
+                break;
+            }
+            cell = next;
+        }
+        cell
+    }
+
+    /// The number of cells.
+    pub fn len(&self) -> usize {
+        self.corners.len()
+    }
+
+    /// The corners of a cell.
+    #[inline]
+    pub fn corners(&self, cell: u32) -> [u32; 3] {
+        self.corners[cell as usize]
+    }
+
+    /// The coordinates of a cell's corners.
+    #[inline]
+    pub fn corners_at(&self, cell: u32) -> [Point<2>; 3] {
+        self.corners[cell as usize].map(|c| self.points[c as usize])
+    }
+
+    /// The guides in a cell.
+    #[inline]
+    pub fn guides_in(&self, cell: u32) -> &[u32] {
+        &self.guides[cell as usize]
+    }
+
+    /// The guides in a cell, to be changed.
+    #[inline]
+    pub fn guides_in_mut(&mut self, cell: u32) -> &mut Vec<u32> {
+        &mut self.guides[cell as usize]
+    }
+
+    /// The place of a point among a cell's corners.
+    #[inline]
+    fn place(&self, cell: u32, point: u32) -> usize {
+        let corners = &self.corners[cell as usize];
+        usize::from(corners[1] == point) + 2 * usize::from(corners[2] == point)
+    }
+
+    /// The cells around a point, counter-clockwise, each with the two corners that follow the point; whether
+    /// they close. Those of a point of the hull begin and end at it.
+    pub fn star(&self, point: u32, star: &mut Vec<(u32, u32, u32)>) -> bool {
+        star.clear();
+        let first = self.cell_of[point as usize];
+        let mut start = first;
+        loop {
+            let next = self.neighbours[start as usize][(self.place(start, point) + 2) % 3];
+            if next == NONE || next == first {
+                break;
+            }
+            start = next;
+        }
+        let mut cell = start;
+        loop {
+            let place = self.place(cell, point);
+            let corners = &self.corners[cell as usize];
+            star.push((cell, corners[(place + 1) % 3], corners[(place + 2) % 3]));
+            cell = self.neighbours[cell as usize][(place + 1) % 3];
+            if cell == NONE || cell == start {
+                return cell == start;
+            }
+        }
+    }
+
+    /// The pair of cells beside the edge across from a corner; `None` on the hull.
+    pub fn pair(&self, cell: u32, place: usize) -> Option<Pair> {
+        let other = self.neighbours[cell as usize][place];
+        if other == NONE {
+            return None;
+        }
+        let corners = self.corners[cell as usize];
+        let [apex, a, b] = [0, 1, 2].map(|k| corners[(place + k) % 3]);
+        let beyond = self.corners[other as usize].into_iter().find(|&c| c != a && c != b);
+        let beyond = beyond.expect("a cell has a corner off an edge");
+        Some(Pair { cells: [cell, other], edge: [a, b], apices: [apex, beyond] })
+    }
+
+    /// Gives a pair of cells the other diagonal, with these guides in the new cells.
+    pub fn swap(&mut self, pair: &Pair, guides: [&mut Vec<u32>; 2]) {
+        let Pair { cells: [cell, other], edge: [a, b], apices: [v, u] } = *pair;
+        let (at, over) = (self.place(cell, v), self.place(other, u));
+        // across from a, b in the one cell and from b, a in the other
+        let across = |cell: u32, place: usize| self.neighbours[cell as usize][place % 3];
+        let (beside_bv, beside_va) = (across(cell, at + 1), across(cell, at + 2));
+        let (beside_au, beside_ub) = (across(other, over + 1), across(other, over + 2));
+        self.corners[cell as usize] = [v, a, u];
+        self.corners[other as usize] = [u, b, v];
+        self.neighbours[cell as usize] = [beside_au, other, beside_va];
+        self.neighbours[other as usize] = [beside_bv, cell, beside_ub];
+        self.replace(beside_au, other, cell);
+        self.replace(beside_bv, cell, other);
+        for (point, cell) in [(v, cell), (a, cell), (u, other), (b, other)] {
+            self.cell_of[point as usize] = cell;
+        }
+        for (cell, new) in [cell, other].into_iter().zip(guides) {
+            std::mem::swap(&mut self.guides[cell as usize], new);
+        }
+    }
+
+    /// Makes `cell` the neighbour of `new` where it had been that of `old`.
+    fn replace(&mut self, cell: u32, old: u32, new: u32) {
+        if cell != NONE {
+            for neighbour in &mut self.neighbours[cell as usize] {
+                if *neighbour == old {
+                    *neighbour = new;
+                }
+            }
+        }
+    }
+
+    /// The mesh, each cell with its lowest corner first, in lexicographic order: as Delaunay's are.
+    pub fn into_mesh(self) -> Result<Mesh<2>, MeshError> {
+        let mut cells = self.corners;
+        for corners in &mut cells {
+            let lowest = (0..3).min_by_key(|&k| corners[k]).expect("three corners");
+            corners.rotate_left(lowest);
+        }
+        cells.sort_unstable();
+        Mesh::new(self.points, cells.into_flattened())
+    }
+}
+
+/// Two cells that share an edge: v a b and u b a, for the edge a b and the apices v u.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub(super) struct Pair {
+    pub cells: [u32; 2],
+    pub edge: [u32; 2],
+    pub apices: [u32; 2],
+}
