@@ -4,6 +4,7 @@ use std::path::PathBuf;
 
 use atomesh::enhance::{EdgeOperator, FeatureOptions, Features};
 use atomesh::image::Units;
+use atomesh::improve::{Align, ImproveOptions};
 use atomesh::optimize::{EngineKind, OptimizeOptions};
 use atomesh::pipeline::{LatticeKind, MeshKind, MeshOptions, Size};
 use atomesh::potential::Interpolation;
@@ -141,6 +142,22 @@ section! {
 }
 
 section! {
+    /// How the mesh is improved once the atoms are connected.
+    pub struct ImprovementOptions {
+        /// Turn the edges (2-D) or faces (3-D) of the mesh onto features: not, by swaps alone, or by
+        /// swaps and moves of points. Default: full
+        #[arg(long, value_name = "HOW",
+            value_parser = named::<Align>(&["off", "swaps", "full"]))]
+        pub align: Align,
+        /// Least angle in degrees that swaps and moves keep or restore: interior angles below 60 in
+        /// 2-D, dihedral angles below 70.5 in 3-D. Default: 20 in 2-D, 15 in 3-D
+        #[arg(long, value_name = "DEGREES",
+            value_parser = number_in(0.0, 70.0, "an angle from 0 to 70"))]
+        pub min_angle: f64,
+    }
+}
+
+section! {
     /// The files that are written.
     pub struct OutputOptions {
         /// Mesh to write: .vtu .vtk .msh (Gmsh 4.1) .msh2 (Gmsh 2.2) .npz .inp (Abaqus), or a folder named
@@ -172,7 +189,7 @@ section! {
     }
 }
 
-/// Everything that decides a run: five tables of options with the command line's names.
+/// Everything that decides a run: tables of options with the command line's names.
 #[derive(Clone, Debug, Default, PartialEq, clap::Args, Serialize, Deserialize)]
 #[serde(default, deny_unknown_fields, rename_all = "kebab-case")]
 pub struct RunConfig {
@@ -200,6 +217,10 @@ pub struct RunConfig {
     #[command(flatten, next_help_heading = "Optimisation")]
     #[serde(skip_serializing_if = "OptimizerOptions::is_empty")]
     pub optimize: OptimizerOptions,
+    /// Improvement.
+    #[command(flatten, next_help_heading = "Improvement")]
+    #[serde(skip_serializing_if = "ImprovementOptions::is_empty")]
+    pub improve: ImprovementOptions,
 }
 
 impl RunConfig {
@@ -247,6 +268,7 @@ impl RunConfig {
             features: self.features.or(below.features),
             frame: self.frame.or(below.frame),
             optimize: self.optimize.or(below.optimize),
+            improve: self.improve.or(below.improve),
         }
     }
 
@@ -280,6 +302,10 @@ impl RunConfig {
                 perturbation: Some(moves.perturbation),
                 seed: Some(moves.seed),
             },
+            improve: ImprovementOptions {
+                align: Some(mesh.improve.align),
+                min_angle: Some(mesh.improve.min_angle),
+            },
             ..Default::default()
         };
         if self.input.potential.is_some() {
@@ -311,6 +337,12 @@ impl RunConfig {
             ..default.optimize
         };
         optimize.validate().map_err(Failure::misuse)?;
+        let improve = ImproveOptions {
+            align: self.improve.align.unwrap_or(default.improve.align),
+            min_angle: self.improve.min_angle.unwrap_or(default.improve.min_angle),
+        };
+        // below the bound of the greater dimension, as long as the image is not known
+        improve.validate(3).map_err(Failure::misuse)?;
         let basis = default.features;
         Ok(MeshOptions {
             features: FeatureOptions {
@@ -330,7 +362,7 @@ impl RunConfig {
             spacing_factor: lattice.spacing_factor.unwrap_or(default.spacing_factor),
             seed_points: seeds.map(|p| axes("--seed-point", &p.0)).collect::<Result<_, _>>()?,
             optimize,
-            improve: default.improve,
+            improve,
             memory_limit: None,
         })
     }

@@ -5,6 +5,7 @@ use std::path::{Path, PathBuf};
 use atomesh::distance::DistanceError;
 use atomesh::enhance::EnhanceError;
 use atomesh::image::Image;
+use atomesh::improve::{ImproveError, ImproveReport};
 use atomesh::lattice::LatticeError;
 use atomesh::measure::{ShapeReport, shape};
 use atomesh::optimize::OptimizeError;
@@ -143,7 +144,8 @@ impl Job<'_> {
         if let Some(report) = &figures.cells {
             watch.say(&cells_summary(&outputs.mesh, report, dimension, watch));
         } else if let Some(shape) = &figures.shape {
-            watch.say(&summary(&outputs.mesh, shape, dimension, watch));
+            let (mesh, improved) = (&outputs.mesh, outcome.improve_report());
+            watch.say(&summary(mesh, shape, improved, dimension, watch));
         }
         Ok(String::new())
     }
@@ -270,6 +272,7 @@ impl Job<'_> {
             "shape": figures.shape_json(),
             "alignment": figures.alignment_json(),
             "optimizer": outcome.optimize_report(),
+            "improve": outcome.improve_report(),
             "seconds": seconds,
             "seconds_total": watch.elapsed().as_secs_f64(),
             "memory_peak_bytes": memory::peak(),
@@ -321,7 +324,8 @@ impl Job<'_> {
                 EnhanceError::EdgeScale { .. } | EnhanceError::Smooth { .. },
             )
             | PipelineError::Lattice(LatticeError::SpacingFactor { .. })
-            | PipelineError::Optimize(OptimizeError::Option { .. }) => Failure::misuse(error),
+            | PipelineError::Optimize(OptimizeError::Option { .. })
+            | PipelineError::Improve(ImproveError::MinAngle { .. }) => Failure::misuse(error),
             _ => Failure::content(error).about(self.path),
         }
     }
@@ -386,11 +390,15 @@ fn cells_summary<const D: usize>(
 fn summary<const D: usize>(
     path: &Path,
     shape: &ShapeReport,
+    improved: Option<&ImproveReport>,
     dimension: &Dimension<D>,
     watch: &Progress,
 ) -> String {
+    let below = improved.filter(|report| !report.floor_held).map_or_else(String::new, |report| {
+        format!(" ({} {} below --min-angle)", report.below, dimension.cells)
+    });
     format!(
-        "{}: {} points, {} {}; quality mean {:.3}, least {:.3}; least angle {:.1}°; {:.2} s",
+        "{}: {} points, {} {}; quality mean {:.3}, least {:.3}; least angle {:.1}°{below}; {:.2} s",
         path.display(),
         shape.points,
         shape.cells,
@@ -403,7 +411,7 @@ fn summary<const D: usize>(
 }
 
 /// Seconds that an atom takes from growth to mesh, for the dimension; a guide, from our own runs.
-const SECONDS_PER_ATOM: [f64; 2] = [2e-5, 1.2e-5];
+const SECONDS_PER_ATOM: [f64; 2] = [5e-5, 1.2e-5];
 
 fn expectation<const D: usize>(prepared: &Prepared<'_, D>, dimension: &Dimension<D>) -> String {
     let estimate = prepared.estimate();

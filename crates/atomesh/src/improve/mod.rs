@@ -5,8 +5,9 @@
 //! mean of b along facets (Hale 2001 names them in section 2.4), moves lower the energy of facets and of shape
 //! together, and neither takes a cell below a floor on its least angle that the mesh had kept so far.
 //!
-//! [`Improver`] is the contract; each dimension has its own. Points are never added or taken away; points
-//! without freedom stay, others stay on the side of the box that they lie on.
+//! [`Improver`] is the contract; each dimension has its own. Points without freedom stay, others stay on the side
+//! of the box that they lie on. In the plane, points that move freely may be taken away where they crowd, and
+//! added where they are missing.
 
 mod plane;
 mod space;
@@ -26,7 +27,8 @@ pub enum Align {
     Off,
     /// Swaps alone; points stay.
     Swaps,
-    /// Swaps and moves.
+    /// Swaps and moves; points go where they crowd and come where they are missing, if the dimension's
+    /// improver can.
     #[default]
     Full,
 }
@@ -56,8 +58,7 @@ impl ImproveOptions {
         if (0.0..below).contains(&value) {
             return Ok(());
         }
-        let expected =
-            if dimension == 2 { "0 or more, below 60" } else { "0 or more, below 70.5" };
+        let expected = if dimension == 2 { "0 or more, below 60" } else { "0 or more, below 70.5" };
         Err(ImproveError::MinAngle { value, expected })
     }
 }
@@ -92,6 +93,10 @@ pub struct ImproveReport {
     pub swaps: usize,
     /// Moves made.
     pub moves: usize,
+    /// Points taken away.
+    pub removed: usize,
+    /// Points added.
+    pub added: usize,
     /// The least angle before, in degrees.
     pub angle_before: f64,
     /// The least angle after, in degrees.
@@ -105,7 +110,8 @@ pub struct ImproveReport {
 /// Improves meshes of one dimension.
 pub trait Improver<const D: usize>: Sync {
     /// The mesh with its cells swapped and its points moved. Bit k of `freedom` of a point: it may move along
-    /// axis k. The points keep their numbers and the result is the same at any thread count.
+    /// axis k. Points keep their order, without those taken away; added points follow. The result is the same
+    /// at any thread count.
     ///
     /// # Errors
     /// [`ImproveError`] if the floor is out of range or the work was cancelled.

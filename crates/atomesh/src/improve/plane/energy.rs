@@ -8,6 +8,9 @@ use super::guides::Guide;
 const BELOW_FLOOR: f64 = 10.0;
 /// The same, for being below at all.
 const JUST_BELOW: f64 = 0.5;
+/// The q of a cell that costs nothing. It is about the mean of aligned meshes, so that neither more cells nor
+/// fewer are cheaper for their number.
+const COMMON_QUALITY: f64 = 0.9;
 /// The share of a guide's pull that is felt from afar.
 const FAR_SHARE: f64 = 0.1;
 
@@ -129,7 +132,7 @@ impl<'a> Energy<'a> {
     /// What a shape costs.
     #[inline]
     pub fn of_shape(&self, shape: Shape) -> f64 {
-        let mut cost = self.shape_weight * (1.0 - shape.q);
+        let mut cost = self.shape_weight * (COMMON_QUALITY - shape.q);
         if shape.sine < self.sine_floor {
             cost += JUST_BELOW + BELOW_FLOOR * (1.0 - shape.sine / self.sine_floor);
         }

@@ -3,7 +3,7 @@
 //! Delaunay's rule gives a mesh whose points lie on valleys and whose edges need not. Here every valley
 //! point ([`guides`]) asks for an edge that passes near it and along it, and every cell for a good shape:
 //!
-//! E = Σ over cells of w (1 − q) + Σ over guides of pull · (1 − how well an edge of its cell follows it)
+//! E = Σ over cells of w (0.9 − q) + Σ over guides of pull · (1 − how well an edge of its cell follows it)
 //!
 //! which counts what the alignment measure counts, smoothed so that descent feels it from afar. An edge gains
 //! nothing from a valley that another follows already, and valleys of any depth pull alike: the sum of b along
@@ -12,11 +12,14 @@
 //! that it touches.
 //!
 //! Rounds, each of swaps ([`swaps`]) and then moves ([`moves`]), lower E until nothing helps. In the first
-//! rounds shape weighs more: cells below the floor are raised before features hold them.
+//! rounds shape weighs more: cells below the floor are raised before features hold them. In some rounds points
+//! are taken away where they crowd and added where they are missing ([`crowds`]).
 
+mod crowds;
 mod energy;
 mod guides;
 mod moves;
+mod star;
 mod swaps;
 #[cfg(test)]
 mod tests;
@@ -36,6 +39,9 @@ use triangles::Triangles;
 const ROUNDS: usize = 10;
 /// The first rounds, in which shape weighs more, and how much more.
 const EARLY: (usize, f64) = (2, 5.0);
+/// The rounds in which points are taken away and added: after shape has been mended and features are followed
+/// where they can be.
+const CROWDS: std::ops::Range<usize> = 2..6;
 
 /// Improves triangles.
 #[derive(Clone, Copy, Debug, Default)]
@@ -62,16 +68,19 @@ impl Improver<2> for PlaneImprover {
         }
         let mut triangles = Triangles::new(mesh, &guides);
         let mut energy = Energy::new(&guides, sine_floor);
+        let is_full = options.align == Align::Full;
         let mut mover = Mover::new(&triangles, freedom, fields.distance, &energy);
         let mut report = ImproveReport::default();
         for round in 0..ROUNDS {
             check(watch, Phase::Improve, round as f64 / ROUNDS as f64, None)?;
             energy.shape_weight = if round < EARLY.0 { EARLY.1 } else { 1.0 };
             let swaps = swaps::swap_all(&mut triangles, &energy, &mut mover);
-            let moves = match options.align {
-                Align::Full => mover.move_all(&mut triangles, &energy),
-                Align::Off | Align::Swaps => 0,
-            };
+            if is_full && CROWDS.contains(&round) {
+                report.removed += crowds::thin_out(&mut triangles, &energy, &mut mover);
+                let distance = fields.distance;
+                report.added += crowds::fill_up(&mut triangles, &energy, &mut mover, distance);
+            }
+            let moves = if is_full { mover.move_all(&mut triangles, &energy) } else { 0 };
             report.rounds += 1;
             report.swaps += swaps;
             report.moves += moves;
@@ -82,8 +91,9 @@ impl Improver<2> for PlaneImprover {
         check(watch, Phase::Improve, 1.0, None)?;
         let mesh = triangles.into_mesh()?;
         let after = Shape::of(&mesh, sine_floor);
-        let ImproveReport { rounds, swaps, moves, .. } = report;
-        Ok((mesh, ImproveReport { rounds, swaps, moves, ..before.report(after) }))
+        let ImproveReport { angle_before, angle_after, below, floor_held, .. } =
+            before.report(after);
+        Ok((mesh, ImproveReport { angle_before, angle_after, below, floor_held, ..report }))
     }
 }
 

@@ -10,7 +10,8 @@ use rayon::prelude::*;
 use crate::distance::NominalDistance;
 use crate::geometry::{Point, difference, distance_squared, dot};
 
-use super::energy::{Edge, Energy, Shape, cross};
+use super::energy::{Energy, least_sine};
+use super::star::Star;
 use super::swaps::LEAST_GAIN;
 use super::triangles::{Pair, Triangles};
 
@@ -48,7 +49,7 @@ impl Mover {
         let mut steps = vec![0.0; count];
         for cell in 0..triangles.len() as u32 {
             let [a, b, c] = triangles.corners_at(cell);
-            let is_low = super::energy::least_sine(a, b, c) < energy.sine_floor;
+            let is_low = least_sine(a, b, c) < energy.sine_floor;
             if is_low || !triangles.guides_in(cell).is_empty() {
                 triangles.corners(cell).iter().for_each(|&c| steps[c as usize] = FIRST_STEP);
             }
@@ -76,6 +77,45 @@ impl Mover {
             self.woken[point as usize] = true;
             let step = &mut self.steps[point as usize];
             *step = step.max(0.5 * FIRST_STEP);
+        }
+    }
+
+    /// d near a point.
+    pub fn distance(&self, point: u32) -> f64 {
+        self.distances[point as usize]
+    }
+
+    /// Whether a point may be taken away: it moves freely, and it is or was awake.
+    pub fn may_go(&self, point: u32) -> bool {
+        self.freedom[point as usize] == 0b11 && self.is_reached(point)
+    }
+
+    /// Whether a point is or was awake.
+    pub fn is_reached(&self, point: u32) -> bool {
+        self.steps[point as usize] > 0.0
+    }
+
+    /// Takes a point away.
+    pub fn remove(&mut self, point: u32) {
+        self.freedom[point as usize] = 0;
+        self.steps[point as usize] = 0.0;
+    }
+
+    /// Adds a point where the nominal distance is `distance`.
+    pub fn add(&mut self, distance: f64) {
+        self.freedom.push(0b11);
+        self.distances.push(distance);
+        self.steps.push(FIRST_STEP);
+        self.changed.push(true);
+        self.woken.push(true);
+    }
+
+    /// Lets points try again that may have far to go.
+    pub fn wake_all(&mut self, points: impl IntoIterator<Item = u32>) {
+        for point in points {
+            let i = point as usize;
+            (self.changed[i], self.woken[i]) = (true, true);
+            self.steps[i] = FIRST_STEP;
         }
     }
 
@@ -109,7 +149,9 @@ impl Mover {
                 if distance_squared(&star.center, &place) > far * far {
                     self.wake_star(&star);
                 }
-                star.share_out(triangles, energy, place);
+                let cells = std::mem::take(&mut star.cells);
+                star.share_out(triangles, energy, |sector| cells[sector].0, place);
+                star.cells = cells;
                 triangles.points[point as usize] = place;
             }
         }
@@ -167,14 +209,17 @@ impl Mover {
         let mut place = None;
         let floor = least.min(energy.sine_floor).max(1e-7);
         let turn = 0.37 * self.rounds as f64 + 0.61 * f64::from(point);
-        for k in 0..star.candidate_count() {
-            let mut x = star.candidate(energy, k, step, turn);
+        let places = Places::new(star, energy, step, turn);
+        for k in 0..places.count() {
+            let mut x = places.at(star, k);
             for axis in 0..2 {
                 if freedom >> axis & 1 == 0 {
                     x[axis] = start[axis];
                 }
             }
-            if x != start && let Some(lower) = star.energy(energy, x, best, floor) {
+            if x != start
+                && let Some(lower) = star.energy(energy, x, best, floor)
+            {
                 best = lower;
                 place = Some(x);
             }
@@ -183,158 +228,56 @@ impl Mover {
     }
 }
 
-/// The cells around a point.
-#[derive(Default)]
-struct Star {
-    center: Point<2>,
-    cells: Vec<(u32, u32, u32)>,
-    is_closed: bool,
-    /// The corners around, one more than cells: the first again at the end if they close.
-    rim: Vec<Point<2>>,
-    rim_edges: Vec<Edge>,
-    rim_lengths: Vec<f64>,
-    guides: Vec<u32>,
-    spokes: Vec<Point<2>>,
-    spoke_lengths: Vec<f64>,
-    spoke_edges: Vec<Edge>,
-    /// The bottom of the valley across the guide nearest to the centre, and the tangent there.
+/// The places that a point tries.
+struct Places {
+    /// The length of steps, and the direction of the first.
+    step: f64,
+    turn: f64,
+    /// The foot of the point on the nearest valley, and the valley's direction.
     valley: Option<(Point<2>, Point<2>)>,
 }
 
-impl Star {
-    /// Takes up the star of a point.
-    fn gather(&mut self, triangles: &Triangles, point: u32) {
-        self.is_closed = triangles.star(point, &mut self.cells);
-        self.center = triangles.points[point as usize];
-        self.rim.clear();
-        self.guides.clear();
-        for &(cell, a, _) in &self.cells {
-            self.rim.push(triangles.points[a as usize]);
-            self.guides.extend_from_slice(triangles.guides_in(cell));
-        }
-        let last = self.cells[self.cells.len() - 1].2;
-        self.rim.push(triangles.points[last as usize]);
-        self.rim_edges.clear();
-        self.rim_edges.extend(self.rim.windows(2).map(|pair| Edge::new(pair[0], pair[1])));
-        self.rim_lengths.clear();
-        let lengths = self.rim.windows(2).map(|pair| distance_squared(&pair[0], &pair[1]).sqrt());
-        self.rim_lengths.extend(lengths);
+impl Places {
+    fn new(star: &Star, energy: &Energy<'_>, step: f64, turn: f64) -> Self {
+        Self { step, turn, valley: nearest_valley(star, energy) }
     }
 
-    /// The sine of the least angle now.
-    fn least_sine(&self) -> f64 {
-        let sines = self.rim.windows(2).map(|pair| super::energy::least_sine(self.center, pair[0], pair[1]));
-        sines.fold(1.0, f64::min)
+    fn count(&self) -> usize {
+        DIRECTIONS + if self.valley.is_some() { 4 } else { 1 }
     }
 
-    /// The energy of the star's cells with the centre at `x`, if it is below `limit` and no cell's least sine
-    /// is below `floor`.
-    fn energy(&mut self, energy: &Energy<'_>, x: Point<2>, limit: f64, floor: f64) -> Option<f64> {
-        self.spokes.clear();
-        self.spokes.extend(self.rim.iter().map(|corner| difference(corner, &x)));
-        self.spoke_lengths.clear();
-        self.spoke_lengths.extend(self.spokes.iter().map(|spoke| dot(spoke, spoke).sqrt()));
-        let mut sum = 0.0;
-        for (i, &rim) in self.rim_lengths.iter().enumerate() {
-            let area = cross(self.spokes[i], self.spokes[i + 1]);
-            let shape = Shape::new(area, [self.spoke_lengths[i], self.spoke_lengths[i + 1], rim]);
-            if shape.sine < floor {
-                return None;
+    /// The k-th place.
+    fn at(&self, star: &Star, k: usize) -> Point<2> {
+        let (start, step) = (star.center, self.step);
+        match self.valley {
+            Some((foot, tangent)) if k > DIRECTIONS => {
+                let along = step * [0.0, 1.0, -1.0][k - DIRECTIONS - 1];
+                [foot[0] + along * tangent[0], foot[1] + along * tangent[1]]
             }
-            sum += energy.of_shape(shape);
-        }
-        if self.guides.is_empty() {
-            return (sum < limit).then_some(sum);
-        }
-        self.spoke_edges.clear();
-        self.spoke_edges.extend(self.rim.iter().map(|&corner| Edge::new(x, corner)));
-        for &guide in &self.guides {
-            if sum >= limit {
-                return None;
-            }
-            let sector = self.sector(difference(&energy.guides[guide as usize].position, &x));
-            let [a, b] = [&self.spoke_edges[sector], &self.spoke_edges[sector + 1]];
-            sum += energy.of_guide(guide, [a, b, &self.rim_edges[sector]]);
-        }
-        (sum < limit).then_some(sum)
-    }
-
-    /// The cell, by its place in the star, that a point of the star lies in, given from the centre: between
-    /// the spokes before and after it. Where rounding leaves none, the one that fits best.
-    #[inline]
-    fn sector(&self, from_center: Point<2>) -> usize {
-        let mut best = (f64::NEG_INFINITY, 0);
-        let mut before = cross(self.spokes[0], from_center);
-        for (i, &spoke) in self.spokes.iter().enumerate().skip(1) {
-            let after = cross(spoke, from_center);
-            let inside = before.min(-after);
-            if inside >= 0.0 {
-                return i - 1;
-            }
-            if inside > best.0 {
-                best = (inside, i - 1);
-            }
-            before = after;
-        }
-        best.1
-    }
-
-    /// Shares the guides out among the cells, for the centre at `x`.
-    fn share_out(&mut self, triangles: &mut Triangles, energy: &Energy<'_>, x: Point<2>) {
-        if self.guides.is_empty() {
-            return;
-        }
-        self.spokes.clear();
-        self.spokes.extend(self.rim.iter().map(|corner| difference(corner, &x)));
-        self.cells.iter().for_each(|cell| triangles.guides_in_mut(cell.0).clear());
-        for &guide in &self.guides {
-            let sector = self.sector(difference(&energy.guides[guide as usize].position, &x));
-            triangles.guides_in_mut(self.cells[sector].0).push(guide);
-        }
-    }
-
-    /// How many places are tried.
-    fn candidate_count(&self) -> usize {
-        DIRECTIONS + if self.guides.is_empty() { 1 } else { 4 }
-    }
-
-    /// The k-th place to try.
-    fn candidate(&mut self, energy: &Energy<'_>, k: usize, step: f64, turn: f64) -> Point<2> {
-        let start = self.center;
-        match k {
-            0 => self.half_way_to_the_middle(),
-            k if k <= DIRECTIONS => {
-                let angle = turn + (k as f64 / DIRECTIONS as f64) * std::f64::consts::TAU;
+            _ if k > 0 => {
+                let angle = self.turn + k as f64 / DIRECTIONS as f64 * std::f64::consts::TAU;
                 [start[0] + step * angle.cos(), start[1] + step * angle.sin()]
             }
-            k => {
-                if k == DIRECTIONS + 1 {
-                    self.valley = Some(self.nearest_valley(energy));
-                }
-                let (bottom, tangent) = self.valley.expect("found for the first of these");
-                let along = step * [0.0, 1.0, -1.0][k - DIRECTIONS - 1];
-                [bottom[0] + along * tangent[0], bottom[1] + along * tangent[1]]
-            }
+            _ => half_way_to_the_middle(star),
         }
     }
+}
 
-    /// Half way to the mean of the corners around.
-    fn half_way_to_the_middle(&self) -> Point<2> {
-        let corners = if self.is_closed { &self.rim[1..] } else { &self.rim[..] };
-        let count = corners.len() as f64;
-        std::array::from_fn(|k| {
-            0.5 * (self.center[k] + corners.iter().map(|corner| corner[k]).sum::<f64>() / count)
-        })
-    }
+/// Half way from the centre to the mean of the corners around.
+fn half_way_to_the_middle(star: &Star) -> Point<2> {
+    let corners = if star.is_closed { &star.rim[1..] } else { &star.rim[..] };
+    let count = corners.len() as f64;
+    std::array::from_fn(|k| {
+        0.5 * (star.center[k] + corners.iter().map(|corner| corner[k]).sum::<f64>() / count)
+    })
+}
 
-    /// The foot of the centre on the line through the nearest guide, and the line's direction.
-    fn nearest_valley(&self, energy: &Energy<'_>) -> (Point<2>, Point<2>) {
-        let guides = self.guides.iter().map(|&guide| &energy.guides[guide as usize]);
-        let far = |p: &Point<2>| distance_squared(p, &self.center);
-        let nearest = guides.min_by(|a, b| far(&a.position).total_cmp(&far(&b.position)));
-        let guide = nearest.expect("a star with guides");
-        let n = guide.normal;
-        let off = dot(&difference(&guide.position, &self.center), &n);
-        ([self.center[0] + off * n[0], self.center[1] + off * n[1]], [-n[1], n[0]])
-    }
+/// The foot of the centre on the line through the nearest guide, and the line's direction.
+fn nearest_valley(star: &Star, energy: &Energy<'_>) -> Option<(Point<2>, Point<2>)> {
+    let guides = star.guides.iter().map(|&guide| &energy.guides[guide as usize]);
+    let far = |p: &Point<2>| distance_squared(p, &star.center);
+    let guide = guides.min_by(|a, b| far(&a.position).total_cmp(&far(&b.position)))?;
+    let n = guide.normal;
+    let off = dot(&difference(&guide.position, &star.center), &n);
+    Some(([star.center[0] + off * n[0], star.center[1] + off * n[1]], [-n[1], n[0]]))
 }

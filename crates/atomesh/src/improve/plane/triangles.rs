@@ -55,8 +55,10 @@ impl Triangles {
         let mut cell = start;
         for _ in 0..self.corners.len() {
             let corners = self.corners_at(cell);
-            let sides = [0, 1, 2].map(|k| doubled_area(corners[(k + 1) % 3], corners[(k + 2) % 3], p));
-            let beyond = (0..3).min_by(|&i, &j| sides[i].total_cmp(&sides[j])).expect("three sides");
+            let sides =
+                [0, 1, 2].map(|k| doubled_area(corners[(k + 1) % 3], corners[(k + 2) % 3], p));
+            let beyond =
+                (0..3).min_by(|&i, &j| sides[i].total_cmp(&sides[j])).expect("three sides");
             let next = self.neighbours[cell as usize][beyond];
             if sides[beyond] >= 0.0 || next == NONE {
                 break;
@@ -66,7 +68,7 @@ impl Triangles {
         cell
     }
 
-    /// The number of cells.
+    /// The number of cells, those that have gone too.
     pub fn len(&self) -> usize {
         self.corners.len()
     }
@@ -162,6 +164,61 @@ impl Triangles {
         }
     }
 
+    /// Takes a point away whose cells, counter-clockwise, close: the `to`-th corner around takes its place in
+    /// all of them but the two that have both, which go.
+    pub fn collapse(&mut self, point: u32, star: &[(u32, u32, u32)], to: usize) {
+        let at = |place: usize| star[place % star.len()];
+        let count = star.len();
+        let (gone, corner, next) = at(to);
+        let (also_gone, previous, _) = at(to + count - 1);
+        let (after, before) = (at(to + 1).0, at(to + count - 2).0);
+        for (gone, beside) in [(gone, after), (also_gone, before)] {
+            let beyond = self.neighbours[gone as usize][self.place(gone, point)];
+            self.replace(beside, gone, beyond);
+            self.replace(beyond, gone, beside);
+        }
+        for &(cell, ..) in star {
+            let place = self.place(cell, point);
+            self.corners[cell as usize][place] = corner;
+        }
+        for gone in [gone, also_gone] {
+            self.corners[gone as usize] = [NONE; 3];
+            self.neighbours[gone as usize] = [NONE; 3];
+            self.guides[gone as usize].clear();
+        }
+        self.cell_of[point as usize] = NONE;
+        for (corner, cell) in [(corner, after), (next, after), (previous, before)] {
+            self.cell_of[corner as usize] = cell;
+        }
+    }
+
+    /// Puts a new point into a pair of cells, which become four: those along the sides from the pair's first
+    /// corner of the edge to the far apex, and so on around. Returns them.
+    pub fn split(&mut self, pair: &Pair, x: Point<2>) -> [u32; 4] {
+        let Pair { cells: [cell, other], edge: [a, b], apices: [v, u] } = *pair;
+        let (at, over) = (self.place(cell, v), self.place(other, u));
+        let across = |cell: u32, place: usize| self.neighbours[cell as usize][place % 3];
+        let (beside_bv, beside_va) = (across(cell, at + 1), across(cell, at + 2));
+        let (beside_au, beside_ub) = (across(other, over + 1), across(other, over + 2));
+        let point = self.points.len() as u32;
+        let (third, fourth) = (self.corners.len() as u32, self.corners.len() as u32 + 1);
+        self.points.push(x);
+        self.corners[other as usize] = [a, u, point];
+        self.corners[cell as usize] = [v, a, point];
+        self.corners.extend([[u, b, point], [b, v, point]]);
+        self.neighbours[other as usize] = [third, cell, beside_au];
+        self.neighbours[cell as usize] = [other, fourth, beside_va];
+        self.neighbours.extend([[fourth, other, beside_ub], [cell, third, beside_bv]]);
+        self.replace(beside_ub, other, third);
+        self.replace(beside_bv, cell, fourth);
+        self.guides.extend([Vec::new(), Vec::new()]);
+        self.cell_of.push(cell);
+        for (point, cell) in [(v, cell), (a, other), (u, third), (b, fourth)] {
+            self.cell_of[point as usize] = cell;
+        }
+        [other, third, fourth, cell]
+    }
+
     /// Makes `cell` the neighbour of `new` where it had been that of `old`.
     fn replace(&mut self, cell: u32, old: u32, new: u32) {
         if cell != NONE {
@@ -173,15 +230,24 @@ impl Triangles {
         }
     }
 
-    /// The mesh, each cell with its lowest corner first, in lexicographic order: as Delaunay's are.
+    /// The mesh of what is left, each cell with its lowest corner first, in lexicographic order: as Delaunay's
+    /// are. Points keep their order.
     pub fn into_mesh(self) -> Result<Mesh<2>, MeshError> {
-        let mut cells = self.corners;
+        let mut numbers = vec![NONE; self.points.len()];
+        let mut points = Vec::with_capacity(self.points.len());
+        for (i, &p) in self.points.iter().enumerate().filter(|(i, _)| self.cell_of[*i] != NONE) {
+            numbers[i] = points.len() as u32;
+            points.push(p);
+        }
+        let live = self.corners.iter().filter(|corners| corners[0] != NONE);
+        let mut cells: Vec<[u32; 3]> =
+            live.map(|corners| corners.map(|c| numbers[c as usize])).collect();
         for corners in &mut cells {
             let lowest = (0..3).min_by_key(|&k| corners[k]).expect("three corners");
             corners.rotate_left(lowest);
         }
         cells.sort_unstable();
-        Mesh::new(self.points, cells.into_flattened())
+        Mesh::new(points, cells.into_flattened())
     }
 }
 
