@@ -33,6 +33,8 @@ pub struct Outputs {
     /// The report.
     pub report: Option<PathBuf>,
     potential: Option<PathBuf>,
+    /// Whether cells of second order are written.
+    is_quadratic: bool,
     /// Facets with b up to this are tagged as features.
     tag_features: Option<f64>,
     /// Whether the image comes from a format in which z is up where it grows.
@@ -79,6 +81,11 @@ impl Format {
     /// Whether it holds groups of facets that follow features.
     fn holds_tags(self) -> bool {
         matches!(self, Self::Simplices(format) if format.holds_tags())
+    }
+
+    /// Whether it holds cells of second order.
+    fn holds_quadratic(self) -> bool {
+        matches!(self, Self::Simplices(format) if format.holds_quadratic())
     }
 
     /// Tries whether the mesh can be written.
@@ -129,6 +136,11 @@ impl Outputs {
             Some(ImageFormat::Nifti | ImageFormat::NiftiGz)
         );
         let report = options.report.clone();
+        let is_quadratic = options.order == Some(2);
+        if is_quadratic && !mesh_format.holds_quadratic() {
+            let message = "--order 2 is for .vtu .vtk .msh .msh2 .inp files";
+            return Err(Failure::misuse(message).about(&mesh));
+        }
         let tag_features = options.tag_features;
         if tag_features.is_some() && !mesh_format.holds_tags() {
             let message = "the format holds no tags; expected .vtu, .msh, .msh2, .inp or polyMesh";
@@ -141,6 +153,7 @@ impl Outputs {
             picture,
             report,
             potential,
+            is_quadratic,
             tag_features,
             z_is_height,
         })
@@ -170,7 +183,14 @@ impl Outputs {
     /// # Errors
     /// [`Failure`] names the first that does not.
     pub fn check(&self, input: &InputOptions, config: Option<&Path>) -> Result<(), Failure> {
-        let inputs = [&input.image, &input.potential, &input.size_field, &input.beta_field];
+        let inputs = [
+            &input.image,
+            &input.potential,
+            &input.size_field,
+            &input.beta_field,
+            &input.mask,
+            &input.labels,
+        ];
         let inputs = inputs.into_iter().flatten().map(PathBuf::as_path);
         let mut taken: Vec<PathBuf> = inputs.filter_map(|p| p.canonicalize().ok()).collect();
         for path in self.paths().chain(config) {
@@ -222,13 +242,28 @@ impl Outputs {
             return self.write_cells(outcome, &provenance, watch);
         };
         let mesh = outcome.world_mesh();
+        let quadratic = self.is_quadratic.then(|| outcome.quadratic());
+        let at_nodes = |values: &[f32]| match &quadratic {
+            Some(quadratic) => quadratic.extend(values),
+            None => values.to_vec(),
+        };
+        let distance = at_nodes(outcome.distance_at_points());
+        let values = at_nodes(outcome.potential_at_points());
+        // formats that hold tags have them as regions
+        let labels = outcome.labels().filter(|_| !self.mesh_format.holds_tags());
+        let labels = labels.map(|l| l.iter().map(|&l| l as f32).collect::<Vec<f32>>());
         let tags = self.tags(outcome, &mesh, watch)?;
-        let data = MeshData::new(&mesh).with_frame(outcome.frame()).with_provenance(&provenance);
-        let data = data.with_tags(&tags);
-        let data = data
-            .with_point_field("distance", outcome.distance_at_points())
-            .and_then(|data| data.with_point_field("potential", outcome.potential_at_points()))
-            .map_err(Failure::content)?;
+        let mut data =
+            MeshData::new(&mesh).with_frame(outcome.frame()).with_provenance(&provenance);
+        data = data.with_tags(&tags);
+        if let Some(quadratic) = &quadratic {
+            data = data.with_quadratic(quadratic);
+        }
+        data = data.with_point_field("distance", &distance).map_err(Failure::content)?;
+        data = data.with_point_field("potential", &values).map_err(Failure::content)?;
+        if let Some(labels) = &labels {
+            data = data.with_cell_field("label", labels).map_err(Failure::content)?;
+        }
         write_mesh_as(&self.mesh, format, &data, watch).map_err(|e| self.mesh_failure(e))
     }
 
@@ -271,14 +306,14 @@ impl Outputs {
 }
 
 impl Outputs {
-    /// The sides of the box, and the features if they are asked for.
+    /// The sides of the box, outline and labels, and the features if they are asked for.
     fn tags<const D: usize>(
         &self,
         outcome: &Outcome<D>,
         world: &Mesh<D>,
         watch: &mut Progress,
     ) -> Result<Tags<D>, Failure> {
-        let sides = outcome.sides();
+        let sides = outcome.tags().map_err(Failure::content)?;
         let Some(below) = self.tag_features else { return Ok(sides) };
         let options = FeatureFacetOptions { below, ..FeatureFacetOptions::default() };
         let found = outcome.features(world, &options, watch).map_err(|e| {

@@ -35,22 +35,33 @@ section! {
         /// Weight β(x), 0 to 1, an image of the same shape; goes before --beta
         #[arg(long, value_name = "FILE", conflicts_with = "beta")]
         pub beta_field: PathBuf,
+        /// Mask: mesh only where this image of the same shape is not 0 (or, where its values are
+        /// shares within 0 to 1, at least 0.5), up to its smooth outline
+        #[arg(long, value_name = "FILE")]
+        pub mask: PathBuf,
+        /// Labels: an image of the same shape whose samples are integers. Each cell gets the one that
+        /// covers most of it, and facets between two are tagged interface-2-5. Without IMAGE, or
+        /// with --features labels, atoms are drawn to where labels meet
+        #[arg(long, value_name = "FILE")]
+        pub labels: PathBuf,
     }
 }
 
 section! {
     /// How the image becomes a potential.
     pub struct PotentialOptions {
-        /// What attracts atoms: dark or bright places, edges, or nothing. Default: dark
+        /// What attracts atoms: dark or bright places, edges, places where labels meet, or nothing.
+        /// Default: dark
         #[arg(long, value_name = "KIND",
-            value_parser = named::<Features>(&["dark", "bright", "edges", "none"]))]
+            value_parser = named::<Features>(&["dark", "bright", "edges", "labels", "none"]))]
         pub features: Features,
         /// How edges are found: derivatives of a Gaussian, or the paper's Prewitt differences.
         /// Default: gaussian
         #[arg(long, value_name = "OPERATOR",
             value_parser = named::<EdgeOperator>(&["gaussian", "prewitt"]))]
         pub edge_operator: EdgeOperator,
-        /// Standard deviation of the Gaussian edge operator in least steps, 0.3 or more. Default: 1.5
+        /// Standard deviation of the Gaussian that finds edges, or where labels meet, in least steps, 0.3
+        /// or more. Default: 1.5
         #[arg(long, value_name = "SIGMA",
             value_parser = number_in(0.3, 1000.0, "a number of samples from 0.3 to 1000"))]
         pub edge_scale: f64,
@@ -142,6 +153,16 @@ section! {
 }
 
 section! {
+    /// How cells are labelled.
+    pub struct RegionOptions {
+        /// Cells of one label that hang together, if fewer than this, take the label of their
+        /// neighbours. Default: 0
+        #[arg(long, value_name = "COUNT", value_parser = clap::value_parser!(u64).range(0..=1_000_000_000))]
+        pub least_island: u64,
+    }
+}
+
+section! {
     /// How the mesh is improved once the atoms are connected.
     pub struct ImprovementOptions {
         /// Turn the edges (2-D) or faces (3-D) of the mesh onto features: not, by swaps alone, or by
@@ -167,6 +188,10 @@ section! {
         /// Version of Gmsh's format in a .msh file. Default: 4.1
         #[arg(long, value_name = "VERSION", value_parser = ["4.1", "2.2"])]
         pub msh: String,
+        /// Order of the cells: 2 writes triangles of 6 and tetrahedra of 10 points, on a mask's outline
+        /// curved. Default: 1
+        #[arg(long, value_name = "ORDER", value_parser = clap::value_parser!(u8).range(1..=2))]
+        pub order: u8,
         /// Tag facets along which the mean of b is at most this, such as -0.2, as features, beside the sides of
         /// the box; `features` does it with more choice. Not in .vtk and .npz
         #[arg(long, value_name = "B", allow_hyphen_values = true,
@@ -209,6 +234,10 @@ pub struct RunConfig {
     #[command(flatten, next_help_heading = "Features")]
     #[serde(skip_serializing_if = "PotentialOptions::is_empty")]
     pub features: PotentialOptions,
+    /// Regions.
+    #[command(flatten, next_help_heading = "Regions")]
+    #[serde(skip_serializing_if = "RegionOptions::is_empty")]
+    pub regions: RegionOptions,
     /// Frame.
     #[command(flatten, next_help_heading = "Frame")]
     #[serde(skip_serializing_if = "FrameOptions::is_empty")]
@@ -266,6 +295,7 @@ impl RunConfig {
             output: self.output.or(below.output),
             lattice: self.lattice.or(below.lattice),
             features: self.features.or(below.features),
+            regions: self.regions.or(below.regions),
             frame: self.frame.or(below.frame),
             optimize: self.optimize.or(below.optimize),
             improve: self.improve.or(below.improve),
@@ -293,6 +323,7 @@ impl RunConfig {
                 smooth: features.smooth,
                 interpolation: Some(mesh.interpolation),
             },
+            regions: RegionOptions { least_island: Some(mesh.least_island as u64) },
             optimize: OptimizerOptions {
                 engine: Some(moves.engine),
                 smoothing_steps: Some(moves.smoothing_steps as u64),
@@ -363,6 +394,7 @@ impl RunConfig {
             seed_points: seeds.map(|p| axes("--seed-point", &p.0)).collect::<Result<_, _>>()?,
             optimize,
             improve,
+            least_island: count(self.regions.least_island, default.least_island),
             memory_limit: None,
         })
     }

@@ -16,6 +16,7 @@ pub mod enhance;
 pub mod mesh;
 pub mod distance;
 pub mod potential;
+pub mod region;
 pub mod lattice;
 pub mod optimize;
 pub mod valley;

@@ -3,7 +3,7 @@
 use std::path::{Path, PathBuf};
 
 use atomesh::distance::DistanceError;
-use atomesh::enhance::EnhanceError;
+use atomesh::enhance::{EnhanceError, Features};
 use atomesh::image::Image;
 use atomesh::improve::{ImproveError, ImproveReport};
 use atomesh::lattice::LatticeError;
@@ -13,6 +13,7 @@ use atomesh::pipeline::{
     Inputs, MeshReport, Outcome, PipelineError, Prepared, VoronoiReport, prepare,
 };
 use atomesh::potential::PotentialError;
+use atomesh::region::RegionError;
 use atomesh::watch::Watch;
 use atomesh_io::image::AnyImage;
 use serde_json::json;
@@ -66,6 +67,9 @@ Examples:
     atomesh mesh --config run.toml --seed 1 -o other.msh
   Polygons whose edges fall on the faults, with the connections that flow needs:
     atomesh mesh faults.png -o faults.vtu --size 8 --mesh voronoi --connections faults.json
+  Only the brain, up to its smooth outline, cells labelled by tissue, of second order:
+    atomesh mesh t1.nii.gz -o brain.msh --features edges --size 6 --mask brain.nii.gz \
+      --labels tissue.nii.gz --order 2
   Raw samples with wells as fixed atoms:
     atomesh mesh cube.raw -o cube.vtu --shape 300,200,100 --dtype float32 \\
       --spacing 25,25,4 --seed-point 2500,1000,200 --seed-point 5000,4000,200";
@@ -80,6 +84,10 @@ pub fn run(args: MeshArgs, watch: &mut Progress) -> Result<String, Failure> {
         let text = std::fs::read_to_string(path)
             .map_err(|e| Failure::content(format!("cannot be read: {e}")).about(path))?;
         run = run.or(RunConfig::parse(&text).map_err(|f| f.about(path))?);
+    }
+    if run.input.image.is_none() && run.input.potential.is_none() && run.input.labels.is_some() {
+        // labels alone: they are the image, and where they meet the features
+        run.features.features = run.features.features.or(Some(Features::Labels));
     }
     run.check()?;
     let shown = shown_path(&run)?.to_path_buf();
@@ -98,7 +106,9 @@ pub fn run(args: MeshArgs, watch: &mut Progress) -> Result<String, Failure> {
 
 /// The image that gives the frame: the potential where there is no other.
 fn shown_path(run: &RunConfig) -> Result<&Path, Failure> {
-    match run.input.image.as_deref().or(run.input.potential.as_deref()) {
+    let input = &run.input;
+    let paths = [&input.image, &input.potential, &input.labels];
+    match paths.into_iter().flatten().next() {
         Some(path) => Ok(path),
         None => Err(Failure::misuse("nothing to mesh; expected IMAGE, or --potential FILE")),
     }
@@ -172,6 +182,8 @@ impl Job<'_> {
         };
         let size_field = field(&input.size_field)?;
         let weight_field = field(&input.beta_field)?;
+        let mask = field(&input.mask)?;
+        let labels = field(&input.labels)?;
         // without IMAGE, the potential is the image
         let potential = if input.image.is_some() { field(&input.potential)? } else { None };
         if let Some(potential) = &potential {
@@ -193,6 +205,8 @@ impl Job<'_> {
             is_potential: input.potential.is_some(),
             size_field: size_field.as_ref(),
             weight_field: weight_field.as_ref(),
+            mask: mask.as_ref(),
+            labels: labels.as_ref(),
         };
         let prepared = prepare(&dimension.method, inputs, options, watch);
         let prepared = prepared.map_err(|e| self.failure(e))?;
@@ -238,8 +252,7 @@ impl Job<'_> {
         if watch.verbosity() == Verbosity::Quiet {
             return Ok(Figures::default());
         }
-        let bounds = outcome.potential().grid().bounds();
-        let shape = shape(outcome.mesh(), Some(&bounds), watch);
+        let shape = shape(outcome.mesh(), outcome.bounds().as_ref(), watch);
         let shape = shape.map_err(|e| self.failure(PipelineError::Measure(e)))?;
         Ok(Figures { shape: Some(shape), ..Figures::default() })
     }
@@ -305,6 +318,10 @@ impl Job<'_> {
             PipelineError::Potential(PotentialError::Weight { index: Some(_), .. }) => {
                 field_failure(&error, self.run.input.beta_field.as_deref())
             }
+            PipelineError::Region(RegionError::Label { .. }) => {
+                field_failure(&error, self.run.input.labels.as_deref())
+            }
+            PipelineError::Region(_) => field_failure(&error, self.run.input.mask.as_deref()),
             PipelineError::Distance(_) if self.run.input.size_field.is_some() => {
                 field_failure(&error, self.run.input.size_field.as_deref())
             }
@@ -314,6 +331,8 @@ impl Job<'_> {
             PipelineError::Shape { name, .. } => {
                 let path = match *name {
                     "size field" => self.run.input.size_field.as_deref(),
+                    "mask" => self.run.input.mask.as_deref(),
+                    "labels" => self.run.input.labels.as_deref(),
                     _ => self.run.input.beta_field.as_deref(),
                 };
                 field_failure(&error, path)

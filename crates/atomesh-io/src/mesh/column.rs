@@ -3,8 +3,6 @@
 use std::io::{self, Write};
 use std::ops::Range;
 
-use atomesh::mesh::Mesh;
-
 use super::data::Values;
 
 /// The order of the bytes in a number.
@@ -108,9 +106,16 @@ impl<'a> Column<'a> {
         }
     }
 
-    /// The points of a mesh as x, y, z; z is 0 in a flat mesh.
-    pub fn points<const D: usize>(mesh: &'a Mesh<D>, endian: Endian) -> Self {
-        let points = mesh.points();
+    /// The first numbers of a field.
+    pub fn first_values(values: Values<'a>, count: usize, endian: Endian) -> Self {
+        match values {
+            Values::Single(values) => Self::slice(&values[..count], endian),
+            Values::Double(values) => Self::slice(&values[..count], endian),
+        }
+    }
+
+    /// Points as x, y, z; z is 0 in a flat mesh.
+    pub fn points<const D: usize>(points: &'a [[f64; D]], endian: Endian) -> Self {
         Self::new(points.len(), 24, move |range, out| {
             for p in &points[range] {
                 for k in 0..3 {

@@ -1,7 +1,7 @@
 //! What goes into a mesh file and what comes out of one.
 
 use atomesh::image::Frame;
-use atomesh::mesh::{Mesh, Tags};
+use atomesh::mesh::{Mesh, Quadratic, Tags};
 
 /// Names that some format gives to other arrays.
 const RESERVED: [&str; 4] = ["points", "cells", "metadata", super::metadata::NAME];
@@ -123,6 +123,7 @@ pub struct MeshData<'a, const D: usize> {
     frame: Option<&'a Frame<D>>,
     provenance: Option<&'a Provenance>,
     tags: Option<&'a Tags<D>>,
+    quadratic: Option<&'a Quadratic<D>>,
 }
 
 impl<'a, const D: usize> MeshData<'a, D> {
@@ -135,7 +136,40 @@ impl<'a, const D: usize> MeshData<'a, D> {
             frame: None,
             provenance: None,
             tags: None,
+            quadratic: None,
         }
+    }
+
+    /// The same with cells of second order, made from this mesh: what is written has their nodes as points,
+    /// corners first, and fields at points need a value at each node (see [`Quadratic::extend`]).
+    pub fn with_quadratic(mut self, quadratic: &'a Quadratic<D>) -> Self {
+        self.quadratic = Some(quadratic);
+        self
+    }
+
+    /// The cells of second order, if there are any.
+    pub fn quadratic(&self) -> Option<&'a Quadratic<D>> {
+        self.quadratic
+    }
+
+    /// The points that are written: the mesh's, or the nodes of cells of second order.
+    pub fn nodes(&self) -> &'a [[f64; D]] {
+        self.quadratic.map_or(self.mesh.points(), Quadratic::nodes)
+    }
+
+    /// The points of all cells that are written, [`nodes_per_cell`](Self::nodes_per_cell) a cell.
+    pub fn cell_nodes(&self) -> &'a [u32] {
+        self.quadratic.map_or(self.mesh.corners(), Quadratic::cells)
+    }
+
+    /// The points of a cell that is written.
+    pub fn nodes_per_cell(&self) -> usize {
+        if self.quadratic.is_some() { Quadratic::<D>::NODES } else { Mesh::<D>::CORNERS }
+    }
+
+    /// The points of a facet that is written: its corners, then the middles of its edges, if there are any.
+    pub fn facet_nodes(&self, facet: &[u32; D]) -> Vec<u32> {
+        self.quadratic.map_or_else(|| facet.to_vec(), |quadratic| quadratic.facet(facet))
     }
 
     /// The same with a value at each point. The pipeline calls d `distance` and b `potential`.
@@ -147,8 +181,7 @@ impl<'a, const D: usize> MeshData<'a, D> {
         name: &'a str,
         values: &'a [f32],
     ) -> Result<Self, MeshDataError> {
-        let count = self.mesh.points().len();
-        let field = checked(&self.point_fields, name, values.into(), count)?;
+        let field = checked(&self.point_fields, name, values.into(), self.nodes().len())?;
         self.point_fields.push(field);
         Ok(self)
     }

@@ -29,9 +29,15 @@ const COMMENT: usize = 200;
 /// The set of all elements.
 const CELLS: &str = "cells";
 
-/// Abaqus' name for triangles (`dimension` 2) or tetrahedra (3).
-fn element_type(dimension: usize) -> &'static str {
-    if dimension == 2 { "CPS3" } else { "C3D4" }
+/// Abaqus' name for cells of so many points: triangles or tetrahedra, or those of second order, whose nodes it
+/// has in our order.
+fn element_type(node_count: usize) -> &'static str {
+    match node_count {
+        3 => "CPS3",
+        4 => "C3D4",
+        6 => "CPS6",
+        _ => "C3D10",
+    }
 }
 
 /// The number of an element's face by the corner, from 0, that is not on it.
@@ -49,7 +55,7 @@ pub fn write_inp<const D: usize>(
     watch: &mut dyn Watch,
 ) -> Result<(), MeshWriteError> {
     let mesh = data.mesh();
-    let total = (mesh.points().len() + mesh.cell_count()).max(1) as f64;
+    let total = (data.nodes().len() + mesh.cell_count()).max(1) as f64;
     let mut to = Lines { out, bytes: Vec::new(), watch, count: 0, total };
     to.line(format_args!("*HEADING\natomesh"))?;
     let json = metadata::encode(data);
@@ -58,20 +64,15 @@ pub fn write_inp<const D: usize>(
         to.line(format_args!("**{} {}", metadata::NAME, part.iter().collect::<String>()))?;
     }
     to.line(format_args!("*NODE"))?;
-    for (i, p) in mesh.points().iter().enumerate() {
+    for (i, p) in data.nodes().iter().enumerate() {
         let z = p.get(2).copied().unwrap_or(0.0);
         to.line(format_args!("{}, {:?}, {:?}, {z:?}", i + 1, p[0], p[1]))?;
     }
-    to.line(format_args!("*ELEMENT, TYPE={}, ELSET={CELLS}", element_type(D)))?;
-    for (i, cell) in mesh.cells().enumerate() {
-        match *cell {
-            [a, b, c] => to.line(format_args!("{}, {}, {}, {}", i + 1, a + 1, b + 1, c + 1))?,
-            [a, b, c, d] => {
-                let [a, b, c, d] = [a, b, c, d].map(|corner| corner + 1);
-                to.line(format_args!("{}, {a}, {b}, {c}, {d}", i + 1))?;
-            }
-            _ => {}
-        }
+    let each = data.nodes_per_cell();
+    to.line(format_args!("*ELEMENT, TYPE={}, ELSET={CELLS}", element_type(each)))?;
+    for (i, cell) in data.cell_nodes().chunks_exact(each).enumerate() {
+        let nodes: Vec<String> = cell.iter().map(|node| (node + 1).to_string()).collect();
+        to.line(format_args!("{}, {}", i + 1, nodes.join(", ")))?;
     }
     if let Some(tags) = data.tags() {
         regions(&mut to, tags)?;

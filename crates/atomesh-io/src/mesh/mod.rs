@@ -86,6 +86,11 @@ impl MeshFormat {
         }
     }
 
+    /// Whether the format holds cells of second order.
+    pub fn holds_quadratic(self) -> bool {
+        !matches!(self, Self::Npz | Self::PolyMesh)
+    }
+
     /// Whether the format holds groups of facets and regions.
     pub fn holds_tags(self) -> bool {
         !matches!(self, Self::Vtk | Self::Npz)

@@ -92,6 +92,8 @@ pub(super) struct Parts {
     /// A value for each cell of the file.
     pub cell_fields: Vec<OwnedField<f64>>,
     pub metadata: Metadata,
+    /// Whether cells of second order were read, of which the corners are kept.
+    pub has_quadratic: bool,
     pub tags: RawTags,
 }
 
@@ -140,8 +142,45 @@ impl Parts {
         }
     }
 
+    /// Drops the points that are no corner of a cell that is kept, if there were cells of second order: the
+    /// middles of their edges.
+    fn drop_middles(&mut self) {
+        if !self.has_quadratic {
+            return;
+        }
+        let cells =
+            if self.tetrahedra.is_empty() { &mut self.triangles } else { &mut self.tetrahedra };
+        let mut number = vec![u32::MAX; self.points.len()];
+        for &corner in cells.iter() {
+            if let Some(n) = number.get_mut(corner as usize) {
+                *n = 0;
+            }
+        }
+        let mut count = 0;
+        for n in number.iter_mut().filter(|n| **n == 0) {
+            *n = count;
+            count += 1;
+        }
+        for corner in cells.iter_mut() {
+            // a corner that is no point stays one that is none
+            *corner = number.get(*corner as usize).copied().unwrap_or(u32::MAX);
+        }
+        let is_kept = |i: usize| number[i] != u32::MAX;
+        let mut at = 0..;
+        self.points.retain(|_| at.next().is_some_and(is_kept));
+        // facets of groups that lose a corner are none of the mesh, and are left out later
+        let renumber = |c: &mut u32| *c = number.get(*c as usize).copied().unwrap_or(u32::MAX);
+        self.tags.edges.iter_mut().for_each(|(edge, _)| edge.iter_mut().for_each(renumber));
+        self.tags.triangles.iter_mut().for_each(|(t, _)| t.iter_mut().for_each(renumber));
+        for field in &mut self.fields {
+            let mut at = 0..;
+            field.values.retain(|_| at.next().is_some_and(|i| i < number.len() && is_kept(i)));
+        }
+    }
+
     /// A mesh of the tetrahedra, if there are any, or else of the triangles.
     pub fn into_mesh(mut self) -> Result<AnyMesh, MeshReadError> {
+        self.drop_middles();
         if !self.tetrahedra.is_empty() {
             let cell_fields = self.fields_of(4);
             let mesh = Mesh::new(self.points, self.tetrahedra)?;

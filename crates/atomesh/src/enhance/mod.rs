@@ -7,6 +7,7 @@
 //!   the median are more extreme. The share is taken of that side, not of all samples, so that
 //!   sparse features are found on a flat background. Where no sample is on that side, more than
 //!   half of the image is feature, and the range's ends stand in.
+//! - *labels*: where values differ, however much.
 //! - *edges*: the background is gradient 0, a full feature its 99.5th percentile, or the greatest
 //!   gradient if that percentile is 0.
 //!
@@ -15,10 +16,11 @@
 //!
 //! Cost: a few passes over the samples. Memory: one f32 a sample beside the image.
 
+mod labels;
 mod quantile;
 mod scale;
 
-use crate::image::{Grid, Image, Samples, Stencil, Units, gaussian_between, magnitude};
+use crate::image::{Grid, Image, Samples, Stencil, Units, gaussian, gaussian_between, magnitude};
 use crate::watch::{Cancelled, Phase, Watch, check};
 use quantile::{Order, Ranks};
 use rayon::prelude::*;
@@ -49,6 +51,8 @@ pub enum Features {
     Bright,
     /// Places where values change: outlines of organs, grains, layers.
     Edges,
+    /// Places where labels meet: the samples are names, not amounts.
+    Labels,
     /// Nothing: b = 0, and the mesh is as regular as it can be.
     None,
 }
@@ -74,7 +78,7 @@ pub struct FeatureOptions {
     /// How edges are found; the other features ignore it. Default: Gaussian, since one sample's
     /// noise already makes a Prewitt edge.
     pub edge_operator: EdgeOperator,
-    /// Standard deviation of the Gaussian operator in least steps from sample to sample, 0.3 or more:
+    /// Standard deviation of the Gaussian operator, also of the one that finds where labels meet, in least steps from sample to sample, 0.3 or more:
     /// less would hardly reach the neighbours. It is as wide in lattice units along every axis, but not
     /// below 0.7 samples along a coarser one. Prewitt's ignores it. Default 1.5: wide enough to fill
     /// the gaps between samples of a slanted edge, narrow enough to keep the two sides of a sheet of 4
@@ -113,7 +117,7 @@ impl FeatureOptions {
             (None, Features::Dark | Features::Bright) => {
                 grid.step.map(|step| ROUNDED * grid.least_step() / step)
             }
-            (None, Features::Edges | Features::None) => [0.0; D],
+            (None, Features::Edges | Features::Labels | Features::None) => [0.0; D],
         }
     }
 }
@@ -154,6 +158,20 @@ pub enum EnhanceError {
     Smooth {
         /// The standard deviation found.
         value: f64,
+    },
+    /// A label is no integer.
+    #[error("sample {index} is {value}; a label is an integer")]
+    Label {
+        /// The sample's index, x fastest.
+        index: usize,
+        /// Its value.
+        value: f32,
+    },
+    /// Values that are no labels.
+    #[error("{count} different samples, each all over the image; expected labels, not grey values")]
+    Labels {
+        /// How many different samples there are.
+        count: usize,
     },
     /// The watch ended the work.
     #[error(transparent)]
@@ -200,6 +218,7 @@ pub fn enhance<const D: usize>(
     check(watch, Phase::Potential, 0.1, None)?;
     let zeros = || vec![0.0; unit.len()];
     let shown = match options.features {
+        Features::Labels => return labelled(image, options, watch),
         Features::None => None,
         _ if unit.is_constant() => None,
         Features::Dark => Some((zeros(), Ramp::dark(&unit))),
@@ -231,6 +250,30 @@ pub fn enhance<const D: usize>(
     } else {
         let parts = values.par_chunks_mut(BLOCK).enumerate();
         parts.for_each(|(block, part)| scale(block * BLOCK, part));
+    }
+    check(watch, Phase::Potential, 1.0, None)?;
+    Ok(Enhanced { values, constant })
+}
+
+/// The potential of a label image: valleys of one depth where labels meet.
+fn labelled<const D: usize>(
+    image: &Image<D>,
+    options: &FeatureOptions,
+    watch: &mut dyn Watch,
+) -> Result<Enhanced, EnhanceError> {
+    let grid = image.frame().grid(options.units);
+    let labels = image.samples().to_f32();
+    let sigma = grid.step.map(|step| (options.edge_scale * grid.least_step() / step).max(0.7));
+    let valleys = labels::interfaces(&labels, &grid, sigma, watch)?;
+    let constant = valleys.is_none();
+    let mut values = valleys.unwrap_or_else(|| vec![0.0; labels.len()]);
+    let sign = if options.repel { 1.0 } else { -1.0 };
+    let sigma = options.sigma(&grid);
+    let turn = |part: &mut [f32]| part.iter_mut().for_each(|b| *b = *b * sign + 0.0);
+    turn(&mut values);
+    if sigma[0] > 0.0 {
+        gaussian(&mut values, grid.shape, sigma);
+        values.iter_mut().for_each(|b| *b = b.clamp(-1.0, 1.0));
     }
     check(watch, Phase::Potential, 1.0, None)?;
     Ok(Enhanced { values, constant })

@@ -11,11 +11,13 @@
 use crate::distance::NominalDistance;
 use crate::geometry::{Bounds, Point, distance_squared};
 use crate::mesh::MOST_POINTS;
+use crate::region::Outline;
 use crate::watch::{Cancelled, Phase, Watch, check};
 
 use super::Lattice;
 use super::crystal::Crystal;
 use super::occupancy::{Look, Occupancy};
+use super::outline::{Planted, plant};
 
 /// How a lattice is grown.
 #[derive(Clone, Debug, PartialEq)]
@@ -102,14 +104,51 @@ pub fn grow<const D: usize>(
     options: &GrowOptions<D>,
     watch: &mut dyn Watch,
 ) -> Result<Lattice<D>, LatticeError> {
+    grow_within(crystal, Place { bounds, distance, outline: None }, options, watch)
+}
+
+/// What a lattice fills.
+#[derive(Clone, Copy, Debug)]
+pub struct Place<'a, const D: usize> {
+    /// The image's box.
+    pub bounds: Bounds<D>,
+    /// d(x).
+    pub distance: &'a NominalDistance<D>,
+    /// The outline of the mask within which atoms are wanted, if not in all of the box.
+    pub outline: Option<&'a Outline<D>>,
+}
+
+impl<const D: usize> Place<'_, D> {
+    /// Whether an atom is wanted at `p`, where the nominal distance is `d`.
+    fn needs(&self, p: &Point<D>, d: f64) -> bool {
+        self.outline.is_none_or(|outline| outline.needs(p, d))
+    }
+}
+
+/// [`grow`] on the outline of a mask first, then inside of it and one layer beyond.
+///
+/// # Errors
+/// As [`grow`].
+pub fn grow_within<const D: usize>(
+    crystal: &Crystal<D>,
+    place: Place<'_, D>,
+    options: &GrowOptions<D>,
+    watch: &mut dyn Watch,
+) -> Result<Lattice<D>, LatticeError> {
+    let Place { bounds, distance, .. } = place;
     let gamma = options.spacing_factor;
     if !(0.1..=1.0).contains(&gamma) {
         return Err(LatticeError::SpacingFactor { value: gamma });
     }
-    let boundary = Boundary::new(bounds, distance)?;
+    let boundary = Boundary::new(place)?;
     let quantum = boundary.quantum;
-    let lattice = boundary.plant_and_divide(&options.seed_points)?;
-    let expected = distance.estimated_atoms(crystal.density());
+    let planted = match place.outline {
+        Some(outline) => plant(outline, distance, gamma, &boundary.fixed(options), watch)?,
+        None => Vec::new(),
+    };
+    let lattice = boundary.plant_and_divide(&options.seed_points, &planted)?;
+    let share = place.outline.map_or(1.0, Outline::mean_share);
+    let expected = share * distance.estimated_atoms(crystal.density());
     if expected > MOST_POINTS as f64 {
         return Err(LatticeError::TooMany { limit: MOST_POINTS });
     }
@@ -122,7 +161,7 @@ pub fn grow<const D: usize>(
     let seeds = lattice.atoms().iter().take_while(|p| options.seed_points.contains(p)).count();
     let unsure = slope_of_a_step(distance);
     let mut growth =
-        Growth { lattice, nominal, occupancy, distance, gamma, unsure, quantum, seeds, expected };
+        Growth { lattice, nominal, occupancy, place, gamma, unsure, quantum, seeds, expected };
     for face in 0..if D == 3 { 6 } else { 0 } {
         growth.face(face / 2, face % 2 == 1, watch)?;
     }
@@ -133,16 +172,14 @@ pub fn grow<const D: usize>(
 /// What any lattice starts from: the user's fixed atoms, the corners, and the edges of the box.
 pub(super) struct Boundary<'a, const D: usize> {
     lattice: Lattice<D>,
-    distance: &'a NominalDistance<D>,
+    place: Place<'a, D>,
     /// Coordinates are multiples of this power of two.
     pub(super) quantum: f64,
 }
 
 impl<'a, const D: usize> Boundary<'a, D> {
-    pub(super) fn new(
-        bounds: Bounds<D>,
-        distance: &'a NominalDistance<D>,
-    ) -> Result<Self, LatticeError> {
+    pub(super) fn new(place: Place<'a, D>) -> Result<Self, LatticeError> {
+        let Place { bounds, distance, .. } = place;
         let extent = bounds.extent();
         if let Some(axis) = (0..D).find(|&k| extent[k] <= 0.0) {
             return Err(LatticeError::Thin { axis });
@@ -152,34 +189,54 @@ impl<'a, const D: usize> Boundary<'a, D> {
             return Err(LatticeError::Scale { distance: least, extent: longest });
         }
         let quantum = 2f64.powi(distance.least().log2().floor() as i32 - 16);
-        Ok(Self { lattice: Lattice::empty(bounds), distance, quantum })
+        Ok(Self { lattice: Lattice::empty(bounds), place, quantum })
     }
 
-    /// The user's fixed atoms, corners, and atoms along every edge of the box at even steps of ∫dx/d.
+    /// The corners of the box.
+    fn corners(&self) -> impl Iterator<Item = Point<D>> + use<D> {
+        let Bounds { min, max } = self.lattice.bounds;
+        (0..1 << D).map(move |c: usize| {
+            std::array::from_fn(|k| if c >> k & 1 == 1 { max[k] } else { min[k] })
+        })
+    }
+
+    /// The atoms that nothing moves: the user's, and the corners.
+    fn fixed(&self, options: &GrowOptions<D>) -> Vec<Point<D>> {
+        let wanted = |p: &Point<D>| self.place.needs(p, self.place.distance.at(p));
+        options.seed_points.iter().copied().chain(self.corners().filter(wanted)).collect()
+    }
+
+    /// The user's fixed atoms, those planted on an outline, corners, and atoms along every edge of the box at
+    /// even steps of ∫dx/d.
     pub(super) fn plant_and_divide(
         mut self,
         seeds: &[Point<D>],
+        planted: &[Planted<D>],
     ) -> Result<Lattice<D>, LatticeError> {
         self.plant(seeds)?;
+        for (p, freedom) in planted {
+            self.lattice.push(*p, *freedom, 1.0);
+        }
+        let distance = self.place.distance;
         let given = self.lattice.len();
         let Bounds { min, max } = self.lattice.bounds;
         let corner = |c: usize| -> Point<D> {
             std::array::from_fn(|k| if c >> k & 1 == 1 { max[k] } else { min[k] })
         };
-        for c in 0..1 << D {
-            if !self.lattice.atoms.contains(&corner(c)) {
-                self.lattice.push(corner(c), 0, 0.0);
+        for c in (0..1 << D).map(corner) {
+            if !self.lattice.atoms.contains(&c) && self.place.needs(&c, distance.at(&c)) {
+                self.lattice.push(c, 0, 0.0);
             }
         }
         for axis in 0..D {
             for c in (0..1 << D).filter(|c| c >> axis & 1 == 0) {
-                for x in even_steps(&corner(c), axis, max[axis], self.distance) {
+                for x in even_steps(&corner(c), axis, max[axis], distance) {
                     let mut p = corner(c);
                     p[axis] = (x / self.quantum).round() * self.quantum;
-                    // only a fixed atom can be in the way
-                    let reach = 0.5 * self.distance.at(&p);
-                    let near = |q: &Point<D>| distance_squared(q, &p) < reach * reach;
-                    if !self.lattice.atoms[..given].iter().any(near) {
+                    // only a fixed or planted atom can be in the way
+                    let d = distance.at(&p);
+                    let near = |q: &Point<D>| distance_squared(q, &p) < 0.25 * d * d;
+                    if self.place.needs(&p, d) && !self.lattice.atoms[..given].iter().any(near) {
                         self.lattice.push(p, 1 << axis, 1.0);
                     }
                 }
@@ -213,7 +270,7 @@ struct Growth<'a, const D: usize> {
     /// d at the atoms.
     nominal: Vec<f64>,
     occupancy: Occupancy<D>,
-    distance: &'a NominalDistance<D>,
+    place: Place<'a, D>,
     gamma: f64,
     /// See [`slope_of_a_step`].
     unsure: f64,
@@ -267,8 +324,8 @@ impl<const D: usize> Growth<'_, D> {
 
     /// Adds an atom at `p` if a ball of diameter γ d is free there.
     fn try_to_add(&mut self, p: Point<D>, freedom: u8) {
-        let d = self.distance.at(&p);
-        if self.occupancy.is_free(&p, self.gamma * d) {
+        let d = self.place.distance.at(&p);
+        if self.place.needs(&p, d) && self.occupancy.is_free(&p, self.gamma * d) {
             self.add(p, d, freedom);
         }
     }
@@ -301,7 +358,7 @@ impl<const D: usize> Growth<'_, D> {
             .collect();
         let mut flat = Bounds { min, max };
         (flat.min[normal], flat.max[normal]) = (centre[normal], centre[normal]);
-        let plane = balls(flat, self.distance, self.gamma, on_face.len());
+        let plane = balls(flat, self.place.distance, self.gamma, on_face.len());
         let whole = std::mem::replace(&mut self.occupancy, plane);
         for i in (0..self.seeds).chain(on_face.iter().copied()) {
             self.occupancy.take(self.lattice.atoms[i], self.gamma * self.nominal[i]);
@@ -395,9 +452,11 @@ impl<const D: usize> Growth<'_, D> {
             if look == Look::Taken {
                 continue;
             }
-            let d = self.distance.at(&site);
+            let d = self.place.distance.at(&site);
             let test = room * d;
-            if look == Look::Free || self.occupancy.look(&site, &(test..=test), own) == Look::Free {
+            let is_free =
+                look == Look::Free || self.occupancy.look(&site, &(test..=test), own) == Look::Free;
+            if is_free && self.place.needs(&site, d) {
                 self.add(site, d, freedom);
             }
         }

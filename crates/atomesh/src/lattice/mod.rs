@@ -7,6 +7,7 @@
 mod crystal;
 mod grow;
 mod occupancy;
+mod outline;
 mod scatter;
 mod settle;
 #[cfg(test)]
@@ -15,7 +16,8 @@ mod tests;
 mod twin;
 
 pub use crystal::{Crystal, CrystalKind};
-pub use grow::{GrowOptions, LatticeError, grow};
+pub use grow::{GrowOptions, LatticeError, Place, grow, grow_within};
+pub use outline::Outlined;
 pub use scatter::{ScatterOptions, Scatterer, fill_holes, scatter};
 pub use settle::settle;
 
@@ -67,6 +69,12 @@ impl<const D: usize> Lattice<D> {
     /// How freely atom `i` moves along axis `k`: 0 where the box, or its temperature, holds it.
     pub fn mobility(&self, i: usize, k: usize) -> f64 {
         if self.freedom[i] >> k & 1 == 1 { f64::from(self.temperature[i]) } else { 0.0 }
+    }
+
+    /// The axes along which the box, or a temperature of 0, lets each atom move, as bits.
+    pub fn freedom(&self) -> Vec<u8> {
+        let one = |i: usize| if self.temperature[i] > 0.0 { self.freedom[i] } else { 0 };
+        (0..self.len()).map(one).collect()
     }
 
     /// Sets the temperature of atom `i`, 0 (frozen) to 1 (free): its variables are scaled by it, so

@@ -19,7 +19,7 @@ use crate::mesh::{ConnectError, Delaunay, Mesh};
 use crate::watch::{Phase, Watch, check};
 
 use super::Lattice;
-use super::grow::{Boundary, LatticeError};
+use super::grow::{Boundary, LatticeError, Place};
 use super::occupancy::Occupancy;
 
 /// What differs between dimensions: how to connect, and the limit of r/d.
@@ -101,7 +101,8 @@ pub fn scatter<const D: usize>(
     watch: &mut dyn Watch,
 ) -> Result<Lattice<D>, LatticeError> {
     let mut random = Pcg64::seed_from_u64(options.seed);
-    let mut lattice = Boundary::new(bounds, distance)?.plant_and_divide(&options.seed_points)?;
+    let mut lattice = Boundary::new(Place { bounds, distance, outline: None })?
+        .plant_and_divide(&options.seed_points, &[])?;
     if D == 3 {
         for face in 0..6 {
             let random = Some(&mut random);

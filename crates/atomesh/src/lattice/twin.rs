@@ -3,7 +3,7 @@
 use rand::{RngExt, SeedableRng};
 use rand_pcg::Pcg64;
 
-use super::grow::{Boundary, GrowOptions, grow, restart_room};
+use super::grow::{Boundary, GrowOptions, Place, grow, restart_room};
 use super::{Crystal, Lattice};
 use crate::distance::NominalDistance;
 use crate::geometry::{Bounds, Point, distance_squared};
@@ -91,9 +91,9 @@ fn grown_slowly<const D: usize>(
     distance: &NominalDistance<D>,
     options: &GrowOptions<D>,
 ) -> Lattice<D> {
-    let boundary = Boundary::new(bounds, distance).unwrap();
+    let boundary = Boundary::new(Place { bounds, distance, outline: None }).unwrap();
     let quantum = boundary.quantum;
-    let lattice = boundary.plant_and_divide(&options.seed_points).unwrap();
+    let lattice = boundary.plant_and_divide(&options.seed_points, &[]).unwrap();
     let seeds = lattice.atoms.iter().take_while(|p| options.seed_points.contains(p)).count();
     let hidden = vec![false; lattice.len()];
     let gamma = options.spacing_factor;

@@ -2,6 +2,7 @@
 
 mod delaunay;
 mod facets;
+mod quadratic;
 mod tags;
 mod validate;
 
@@ -9,6 +10,7 @@ use crate::geometry::Simplex;
 pub(crate) use delaunay::MOST_POINTS;
 pub use delaunay::{ConnectError, Delaunay, merge_duplicates};
 pub use facets::{CellsOfPoints, Facet};
+pub use quadratic::Quadratic;
 use rayon::prelude::*;
 pub use tags::{FacetGroup, Regions, Tags, TagsError};
 pub use validate::MeshFault;

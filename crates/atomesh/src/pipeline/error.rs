@@ -9,6 +9,7 @@ use crate::measure::MeasureError;
 use crate::mesh::ConnectError;
 use crate::optimize::OptimizeError;
 use crate::potential::PotentialError;
+use crate::region::RegionError;
 use crate::voronoi::VoronoiError;
 use crate::watch::Cancelled;
 
@@ -74,6 +75,9 @@ pub enum PipelineError {
     /// The atoms could not be connected.
     #[error(transparent)]
     Connect(ConnectError),
+    /// A mask or labels are of no use.
+    #[error(transparent)]
+    Region(RegionError),
     /// The mesh could not be improved.
     #[error(transparent)]
     Improve(ImproveError),
@@ -101,6 +105,7 @@ impl PipelineError {
                 | Self::Lattice(LatticeError::Cancelled(_))
                 | Self::Optimize(OptimizeError::Cancelled(_))
                 | Self::Connect(ConnectError::Cancelled(_))
+                | Self::Region(RegionError::Cancelled(_))
                 | Self::Improve(ImproveError::Cancelled(_))
                 | Self::Features(FeaturesError::Cancelled(_))
                 | Self::Voronoi(VoronoiError::Cancelled(_))
@@ -118,7 +123,7 @@ macro_rules! from {
         })*
     };
 }
-from!(LatticeError => Lattice, OptimizeError => Optimize, ConnectError => Connect, ImproveError => Improve, FeaturesError => Features, VoronoiError => Voronoi, MeasureError => Measure);
+from!(LatticeError => Lattice, OptimizeError => Optimize, ConnectError => Connect, RegionError => Region, ImproveError => Improve, FeaturesError => Features, VoronoiError => Voronoi, MeasureError => Measure);
 
 /// What is odd but no error.
 #[derive(Clone, Debug, PartialEq, serde::Serialize, thiserror::Error)]

@@ -38,10 +38,16 @@ use crate::enhance::{self, FeatureOptions, Features};
 use crate::geometry::{Point, compact_order};
 use crate::image::{Frame, Grid, Image, Units};
 use crate::improve::{Align, ImproveReport};
-use crate::lattice::{GrowOptions, Lattice, ScatterOptions, fill_holes, grow, scatter, settle};
+use crate::lattice::{
+    GrowOptions, Lattice, Outlined, Place, ScatterOptions, fill_holes, grow_within, scatter, settle,
+};
 use crate::mesh::{Mesh, merge_duplicates};
 use crate::optimize::{EngineKind, Fields, OptimizeReport, optimize};
 use crate::potential::{ImagePotential, ImageWeight, Interpolation};
+use crate::region::{
+    Outline, RegionError, Trimmed, fit, islands, label_samples, majority, outline_facets, smooth,
+    trim,
+};
 use crate::voronoi::{PolyMesh, voronoi};
 use crate::watch::{Phase, Watch, check};
 use rayon::prelude::*;
@@ -57,12 +63,23 @@ pub struct Inputs<'a, const D: usize> {
     pub size_field: Option<&'a Image<D>>,
     /// β(x), 0…1; goes before [`MeshOptions::image_weight`].
     pub weight_field: Option<&'a Image<D>>,
+    /// Where to mesh: nonzero is inside, or, of shares within 0…1, at least one half.
+    pub mask: Option<&'a Image<D>>,
+    /// A label for each sample: cells get that of most of them.
+    pub labels: Option<&'a Image<D>>,
 }
 
 impl<'a, const D: usize> Inputs<'a, D> {
     /// An image alone.
     pub fn image(image: &'a Image<D>) -> Self {
-        Self { image, is_potential: false, size_field: None, weight_field: None }
+        Self {
+            image,
+            is_potential: false,
+            size_field: None,
+            weight_field: None,
+            mask: None,
+            labels: None,
+        }
     }
 }
 
@@ -75,6 +92,9 @@ pub struct Prepared<'m, const D: usize> {
     potential: ImagePotential<D>,
     weight: ImageWeight<D>,
     distance: NominalDistance<D>,
+    /// Where the mesh ends, if it does not fill the box.
+    outline: Option<Outline<D>>,
+    labels: Option<Vec<i32>>,
     warnings: Vec<Warning>,
 }
 
@@ -98,9 +118,26 @@ pub fn prepare<'m, const D: usize>(
     }
     method.crystal(options.lattice)?; // refuse early what does not fit the dimension
     let mut warnings = Vec::new();
-    let samples = potential_samples(&inputs, &options, &mut warnings, watch)?;
+    let labels = match inputs.labels {
+        Some(labels) => {
+            same_shape("labels", &frame, labels)?;
+            Some(label_samples(labels.samples())?)
+        }
+        None => None,
+    };
+    let mut samples = potential_samples(&inputs, &options, &mut warnings, watch)?;
     check(watch, Phase::Distance, 0.0, None)?;
     let distance = nominal_distance(&inputs, &grid, &options, &samples)?;
+    let outline = match inputs.mask {
+        Some(mask) => {
+            same_shape("mask", &frame, mask)?;
+            Outline::new(mask, grid, &distance, watch)?
+        }
+        None => None,
+    };
+    if let Some(outline) = &outline {
+        outline.combine(&mut samples);
+    }
     let weight = match inputs.weight_field {
         Some(field) => {
             same_shape("weight field", &frame, field)?;
@@ -115,7 +152,18 @@ pub fn prepare<'m, const D: usize>(
     }
     check(watch, Phase::Distance, 1.0, None)?;
     let potential = ImagePotential::new(grid, samples, options.interpolation)?;
-    Ok(Prepared { method, options, frame, grid, potential, weight, distance, warnings })
+    Ok(Prepared {
+        method,
+        options,
+        frame,
+        grid,
+        potential,
+        weight,
+        distance,
+        outline,
+        labels,
+        warnings,
+    })
 }
 
 /// b at the samples: enhanced, or as given.
@@ -129,7 +177,11 @@ fn potential_samples<const D: usize>(
         return Ok(enhance::given_potential(inputs.image.samples().clone())?);
     }
     let features = FeatureOptions { units: options.units, ..options.features };
-    let enhanced = enhance::enhance(inputs.image, &features, watch)?;
+    let image = match (inputs.labels, features.features) {
+        (Some(labels), Features::Labels) => labels,
+        _ => inputs.image,
+    };
+    let enhanced = enhance::enhance(image, &features, watch)?;
     if enhanced.constant && features.features != Features::None {
         warnings.push(Warning::Constant);
     }
@@ -189,7 +241,8 @@ impl<const D: usize> Prepared<'_, D> {
     /// What the rest of the work will take.
     pub fn estimate(&self) -> Estimate {
         let filling = self.method.filling(self.options.lattice);
-        let atoms = estimate::atoms(&self.grid, &self.distance, filling);
+        let share = self.outline.as_ref().map_or(1.0, Outline::mean_share);
+        let atoms = share * estimate::atoms(&self.grid, &self.distance, filling);
         let field = self.options.optimize.engine == EngineKind::Sampled;
         let spline = self.options.interpolation == Interpolation::Spline;
         let smooth = self.options.optimize.smoothing_steps > 0;
@@ -213,7 +266,9 @@ impl<const D: usize> Prepared<'_, D> {
             Some(crystal) => {
                 let options =
                     GrowOptions { spacing_factor: self.options.spacing_factor, seed_points: seeds };
-                let lattice = grow(crystal, bounds, &self.distance, &options, watch)?;
+                let place =
+                    Place { bounds, distance: &self.distance, outline: self.outline.as_ref() };
+                let lattice = grow_within(crystal, place, &options, watch)?;
                 self.even_out(lattice, watch)?
             }
             None => {
@@ -232,7 +287,8 @@ impl<const D: usize> Prepared<'_, D> {
         lattice: Lattice<D>,
         watch: &mut dyn Watch,
     ) -> Result<Lattice<D>, PipelineError> {
-        let (Some(evening), false) = (self.method.evening(), self.distance.is_constant()) else {
+        let is_even = self.distance.is_constant() || self.outline.is_some();
+        let (Some(evening), false) = (self.method.evening(), is_even) else {
             return Ok(lattice);
         };
         let (scatterer, distance) = (self.method.scatterer(), &self.distance);
@@ -247,7 +303,7 @@ impl<const D: usize> Prepared<'_, D> {
 
     /// Whether atoms stay as they were grown: nothing pulls them, and they are evened out already.
     fn stays_as_grown(&self) -> bool {
-        let is_crystal = self.options.lattice != LatticeKind::Random;
+        let is_crystal = self.options.lattice != LatticeKind::Random && self.outline.is_none();
         let is_even = is_crystal && self.method.evening().is_some() && !self.distance.is_constant();
         is_even && (self.weight.as_constant() == Some(0.0) || self.potential.range() == (0.0, 0.0))
     }
@@ -286,6 +342,50 @@ impl<const D: usize> Prepared<'_, D> {
         Ok(Some(voronoi(delaunay, mesh.points(), self.grid.bounds(), watch)?))
     }
 
+    /// Connects the atoms; with the axes along which the box lets each point move.
+    fn connect(
+        &self,
+        lattice: Lattice<D>,
+        watch: &mut dyn Watch,
+    ) -> Result<(Mesh<D>, Vec<u8>), PipelineError> {
+        // where the image alone counts, atoms may fall into the same corner
+        let (points, merged) = merge_duplicates(lattice.atoms());
+        let freedom = lattice.freedom_of(&merged, points.len());
+        drop(lattice);
+        Ok((self.method.delaunay().connect(&points, watch)?, freedom))
+    }
+
+    /// Connects the atoms of a masked lattice and drops what is outside; points on the outline may not move
+    /// any more.
+    fn connect_within(
+        &self,
+        lattice: Lattice<D>,
+        outline: &Outline<D>,
+        watch: &mut dyn Watch,
+    ) -> Result<Trimmed<D>, PipelineError> {
+        let outlined = Outlined::new(lattice, outline, &self.distance);
+        if outlined.lattice().len() <= D {
+            return Err(RegionError::SmallMask { distance: self.distance.least() }.into());
+        }
+        let (outlined, mesh) =
+            outlined.connect(self.method.delaunay(), outline, &self.distance, watch)?;
+        let freedom = outlined.lattice().freedom();
+        let trimmed = trim(mesh, (outlined.on_outline(), &freedom), outline, watch)?;
+        drop(outlined);
+        let mut trimmed = fit(smooth(trimmed, outline, watch)?, outline)?;
+        for &point in trimmed.facets.as_flattened() {
+            trimmed.freedom[point as usize] = 0;
+        }
+        Ok(trimmed)
+    }
+
+    /// The label of each cell.
+    fn label(&self, mesh: &Mesh<D>, samples: &[i32]) -> Vec<i32> {
+        let mut labels = majority(mesh, &self.grid, samples);
+        islands(mesh, &mut labels, self.options.least_island);
+        labels
+    }
+
     /// The fields that atoms move in.
     fn fields(&self) -> Fields<'_, D> {
         Fields { potential: &self.potential, weight: &self.weight, distance: &self.distance }
@@ -309,14 +409,20 @@ impl<const D: usize> Prepared<'_, D> {
         } else {
             optimize(lattice, self.fields(), &self.options.optimize, watch)?.into_parts()
         };
-        // where the image alone counts, atoms may fall into the same corner
-        let (points, merged) = merge_duplicates(lattice.atoms());
-        let freedom = lattice.freedom_of(&merged, points.len());
-        drop(lattice);
-        let mesh = self.method.delaunay().connect(&points, watch)?;
-        drop(points);
+        let (mesh, freedom) = match &self.outline {
+            Some(outline) => {
+                let trimmed = self.connect_within(lattice, outline, watch)?;
+                (trimmed.mesh, trimmed.freedom)
+            }
+            None => self.connect(lattice, watch)?,
+        };
         let cells = self.cells(&mesh, watch)?;
         let (mesh, improve_report) = self.improve(mesh, &freedom, watch)?;
+        let outline_facets = match &self.outline {
+            Some(_) => outline_facets(&mesh, &self.grid.bounds()),
+            None => Vec::new(),
+        };
+        let labels = self.labels.as_ref().map(|labels| self.label(&mesh, labels));
         let points = mesh.points().par_iter().with_min_len(1 << 10);
         let distance = points.clone().map(|p| self.distance.at(p) as f32).collect();
         let (low, high) = self.potential.range(); // a spline passes beyond it at jumps
@@ -333,6 +439,9 @@ impl<const D: usize> Prepared<'_, D> {
             units: self.options.units,
             optimize_report: report,
             improve_report,
+            outline: self.outline,
+            outline_facets,
+            labels,
             warnings: self.warnings,
         })
     }

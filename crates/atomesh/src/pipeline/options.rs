@@ -96,6 +96,8 @@ pub struct MeshOptions<const D: usize> {
     pub optimize: OptimizeOptions,
     /// How the mesh is improved once the atoms are connected. Default [`ImproveOptions::for_dimension`].
     pub improve: ImproveOptions,
+    /// Groups of fewer cells of one label than this take that of their neighbours. Default 0: all stay.
+    pub least_island: usize,
     /// Bytes beyond which the work is refused. Default none.
     pub memory_limit: Option<u64>,
 }
@@ -114,6 +116,7 @@ impl<const D: usize> Default for MeshOptions<D> {
             seed_points: Vec::new(),
             optimize: OptimizeOptions::for_dimension(D),
             improve: ImproveOptions::for_dimension(D),
+            least_island: 0,
             memory_limit: None,
         }
     }

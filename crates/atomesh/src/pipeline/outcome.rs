@@ -10,9 +10,10 @@ use crate::measure::{
     MeasureError, ShapeReport, SpreadReport, WantedSize, alignment, alignment_of_faces, features,
     fidelity, precision, shape, spread,
 };
-use crate::mesh::{Mesh, Tags};
+use crate::mesh::{FacetGroup, Mesh, Quadratic, Regions, Tags, TagsError};
 use crate::optimize::OptimizeReport;
 use crate::potential::ImagePotential;
+use crate::region::{Outline, interfaces};
 use crate::voronoi::{FeatureFaces, PolyMesh, PolyReport, feature_faces};
 use crate::watch::Watch;
 
@@ -31,6 +32,9 @@ pub struct Outcome<const D: usize> {
     pub(super) units: Units,
     pub(super) optimize_report: OptimizeReport,
     pub(super) improve_report: Option<ImproveReport>,
+    pub(super) outline: Option<Outline<D>>,
+    pub(super) outline_facets: Vec<[u32; D]>,
+    pub(super) labels: Option<Vec<i32>>,
     pub(super) warnings: Vec<Warning>,
 }
 
@@ -186,6 +190,71 @@ impl<const D: usize> Outcome<D> {
         self.improve_report.as_ref()
     }
 
+    /// Where the mesh ends, if a mask says so.
+    pub fn outline(&self) -> Option<&Outline<D>> {
+        self.outline.as_ref()
+    }
+
+    /// The facets on the mask's outline, normals outward in lattice space; none without a mask.
+    pub fn outline_facets(&self) -> &[[u32; D]] {
+        &self.outline_facets
+    }
+
+    /// The label of each cell, if there were labels.
+    pub fn labels(&self) -> Option<&[i32]> {
+        self.labels.as_deref()
+    }
+
+    /// The tags of [`Outcome::world_mesh`]: the box's sides `xmin` … `zmax`; with a mask, `mask`, its outline;
+    /// with labels, regions of the same numbers, and for each two that meet their facets, as
+    /// `interface-2-5`.
+    ///
+    /// # Errors
+    /// [`TagsError`] if there are too many interfaces to number.
+    pub fn tags(&self) -> Result<Tags<D>, TagsError> {
+        let sides = sides(&self.mesh, &self.potential.grid().bounds(), false);
+        let is_whole = self.outline.is_none();
+        let mut groups: Vec<FacetGroup<D>> = (sides.facet_groups().iter())
+            .filter(|group| is_whole || !group.facets.is_empty())
+            .cloned()
+            .collect();
+        let mut id = 2 * D as u32;
+        let mut add = |name: String, facets: Vec<[u32; D]>| {
+            id += 1;
+            groups.push(FacetGroup { id, name, facets });
+        };
+        if self.outline.is_some() {
+            add("mask".into(), self.outline_facets.clone());
+        }
+        for ([low, high], facets) in self.labels.iter().flat_map(|l| interfaces(&self.mesh, l)) {
+            add(format!("interface-{low}-{high}"), facets);
+        }
+        let regions = self.labels.clone().map(|of_cells| Regions { of_cells, names: Vec::new() });
+        let tags = Tags::new(&self.mesh, groups, regions)?;
+        Ok(if self.frame.is_mirrored() { tags.turned() } else { tags })
+    }
+
+    /// The mesh with quadratic cells, in world coordinates: straight, but on a mask's outline, where the middles
+    /// of edges are put onto it as long as their cells stay valid.
+    pub fn quadratic(&self) -> Quadratic<D> {
+        let mut quadratic = Quadratic::new(&self.mesh);
+        if let Some(outline) = &self.outline {
+            let all = ((1 << D) - 1) as u8;
+            let bounds = self.potential.grid().bounds();
+            quadratic.curve(&self.outline_facets, |p| {
+                let side = |k: &usize| p[*k] == bounds.min[*k] || p[*k] == bounds.max[*k];
+                let held: u8 = (0..D).filter(side).map(|k| 1 << k).sum();
+                outline.project(p, all & !held, 0.3 * self.distance.at(p))
+            });
+        }
+        quadratic.moved(self.frame.is_mirrored(), |p| self.frame.lattice_to_world(self.units, p))
+    }
+
+    /// The box that the mesh fills; `None` if it ends at a mask's outline.
+    pub fn bounds(&self) -> Option<Bounds<D>> {
+        self.outline.is_none().then(|| self.potential.grid().bounds())
+    }
+
     /// What was odd.
     pub fn warnings(&self) -> &[Warning] {
         &self.warnings
@@ -198,7 +267,8 @@ impl<const D: usize> Outcome<D> {
     pub fn report(&self, watch: &mut dyn Watch) -> Result<MeshReport, PipelineError> {
         let size =
             WantedSize { mean: self.distance.mean(), at_points: Some(&self.distance_at_points) };
-        MeshReport::new(&self.mesh, self.potential.grid(), self.potential.samples(), size, watch)
+        let (grid, samples) = (self.potential.grid(), self.potential.samples());
+        MeshReport::within(&self.mesh, self.bounds(), (grid, samples), size, watch)
             .map_err(PipelineError::Measure)
     }
 
@@ -240,8 +310,22 @@ impl MeshReport {
         size: WantedSize<'_>,
         watch: &mut dyn Watch,
     ) -> Result<Self, MeasureError> {
+        Self::within(mesh, Some(grid.bounds()), (grid, potential), size, watch)
+    }
+
+    /// [`MeshReport::new`] for a mesh that fills `bounds`, or, if `None`, a part of the grid's box.
+    ///
+    /// # Errors
+    /// As [`MeshReport::new`].
+    pub fn within<const D: usize>(
+        mesh: &Mesh<D>,
+        bounds: Option<Bounds<D>>,
+        (grid, potential): (&Grid<D>, &[f32]),
+        size: WantedSize<'_>,
+        watch: &mut dyn Watch,
+    ) -> Result<Self, MeasureError> {
         let spread = spread(mesh, size, watch)?;
-        let shape = shape(mesh, Some(&grid.bounds()), watch)?;
+        let shape = shape(mesh, bounds.as_ref(), watch)?;
         let size = samples_of(size.mean, grid);
         let found = features(potential, grid.shape, size, watch)?;
         let options = AlignmentOptions::new(size);

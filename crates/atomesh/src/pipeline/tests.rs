@@ -171,6 +171,7 @@ fn random_options<const D: usize>(random: &mut Pcg64, image: &Image<D>) -> MeshO
             ..Default::default()
         },
         improve: crate::improve::ImproveOptions::for_dimension(D),
+        least_island: random.random_range(0..9),
         memory_limit: None,
     }
 }

@@ -32,11 +32,24 @@ pub enum MshEncoding {
     Text,
 }
 
-/// Gmsh's number for a line (`dimension` 1), a triangle (2) or a tetrahedron (3).
-pub(super) fn element_type(dimension: usize) -> i32 {
-    match dimension {
-        1 => 1,
-        2 => 2,
-        _ => 4,
+/// Gmsh's number for a line (`dimension` 1), a triangle (2) or a tetrahedron (3), or for one of second order.
+pub(super) fn element_type(dimension: usize, is_quadratic: bool) -> i32 {
+    match (dimension, is_quadratic) {
+        (1, false) => 1,
+        (2, false) => 2,
+        (_, false) => 4,
+        (1, true) => 8,
+        (2, true) => 9,
+        (_, true) => 11,
+    }
+}
+
+/// The place in VTK's order, which is ours, of point `k` of a cell of so many points: Gmsh has the last two of
+/// a tetrahedron of second order the other way round.
+pub(super) fn place(node_count: usize, k: usize) -> usize {
+    match (node_count, k) {
+        (10, 8) => 9,
+        (10, 9) => 8,
+        _ => k,
     }
 }

@@ -449,9 +449,18 @@ impl Reader<'_> {
         read: impl Fn(&mut Self) -> Result<u64, MeshReadError>,
     ) -> Result<(), MeshReadError> {
         let mut cell = [0; 4];
+        // of cells of second order the corners, which come first
+        let is_quadratic = matches!(kind, 8 | 9 | 11);
+        let kind = match kind {
+            8 => 1,
+            9 => 2,
+            11 => 4,
+            _ => kind,
+        };
+        self.parts.has_quadratic |= is_quadratic;
         for k in 0..corners {
             let tag = read(self)?;
-            if matches!(kind, 1 | 2 | 4) {
+            if matches!(kind, 1 | 2 | 4) && k < corners_of(kind) {
                 let index = self.index_of.index(tag);
                 cell[k] = index.ok_or_else(|| {
                     malformed(self.from.at, "a point's tag before this", tag.to_string())
@@ -555,6 +564,15 @@ fn sort_cells<const N: usize>(order: &[usize], corners: &mut Vec<u32>, regions: 
     }
     *corners = order.iter().flat_map(|&cell| &corners[cell * N..(cell + 1) * N]).copied().collect();
     *regions = order.iter().map(|&cell| regions[cell]).collect();
+}
+
+/// How many corners a line (Gmsh's type 1), a triangle (2) or a tetrahedron (4) has.
+fn corners_of(kind: i32) -> usize {
+    match kind {
+        1 => 2,
+        2 => 3,
+        _ => 4,
+    }
 }
 
 /// How many points a cell of Gmsh's type has.

@@ -10,7 +10,7 @@ use super::super::column::{Endian, Number};
 use super::super::data::{Field, MeshData};
 use super::super::{MeshWriteError, metadata};
 use super::entities::Entities;
-use super::{MshEncoding, MshVersion, element_type};
+use super::{MshEncoding, MshVersion, element_type, place};
 
 /// Bytes gathered before they are handed on.
 const CHUNK: usize = 1 << 18;
@@ -31,7 +31,7 @@ pub fn write_msh<const D: usize>(
 ) -> Result<(), MeshWriteError> {
     let entities = Entities::of(data);
     let elements = data.mesh().cell_count() + entities.facet_count();
-    let count = data.mesh().points().len().max(elements);
+    let count = data.nodes().len().max(elements);
     if i32::try_from(count).is_err() {
         return Err(MeshWriteError::TooMany { format: "MSH", count, limit: i32::MAX as usize });
     }
@@ -43,12 +43,12 @@ pub fn write_msh<const D: usize>(
     match version {
         MshVersion::V41 => {
             entities_41(&mut numbers, data.mesh(), &entities);
-            nodes_41(&mut numbers, data.mesh())?;
-            elements_41(&mut numbers, data.mesh(), &entities)?;
+            nodes_41(&mut numbers, data.nodes())?;
+            elements_41(&mut numbers, data, &entities)?;
         }
         MshVersion::V22 => {
-            nodes_22(&mut numbers, data.mesh())?;
-            elements_22(&mut numbers, data.mesh(), &entities)?;
+            nodes_22(&mut numbers, data.nodes())?;
+            elements_22(&mut numbers, data, &entities)?;
         }
     }
     for field in data.point_fields() {
@@ -162,18 +162,19 @@ impl<W: Write> Numbers<'_, W> {
     fn element_22(
         &mut self,
         tag: usize,
-        dimension: usize,
+        kind: i32,
         (physical, entity): (i32, usize),
-        corners: &[u32],
+        nodes: &[u32],
     ) {
         self.int(tag);
         if self.encoding == MshEncoding::Text {
-            self.put(element_type(dimension));
+            self.put(kind);
             self.int(2);
         }
         self.put(physical);
         self.int(entity);
-        corners.iter().for_each(|&corner| self.int(corner as usize + 1));
+        let count = nodes.len();
+        (0..count).for_each(|k| self.int(nodes[place(count, k)] as usize + 1));
     }
 
     fn point<const D: usize>(&mut self, p: &[f64; D]) {
@@ -185,9 +186,9 @@ impl<W: Write> Numbers<'_, W> {
 
 fn nodes_41<W: Write, const D: usize>(
     to: &mut Numbers<W>,
-    mesh: &Mesh<D>,
+    points: &[[f64; D]],
 ) -> Result<(), MeshWriteError> {
-    let count = mesh.points().len();
+    let count = points.len();
     to.text("$Nodes\n");
     to.sizes([1, count, count.min(1), count]); // blocks, points, least and greatest tag
     to.line();
@@ -198,7 +199,7 @@ fn nodes_41<W: Write, const D: usize>(
         to.size(tag);
         to.item()?;
     }
-    for p in mesh.points() {
+    for p in points {
         to.point(p);
         to.item()?;
     }
@@ -209,36 +210,37 @@ fn nodes_41<W: Write, const D: usize>(
 /// One block an entity: the cells of each region, numbered as in the mesh, and the facets after them.
 fn elements_41<W: Write, const D: usize>(
     to: &mut Numbers<W>,
-    mesh: &Mesh<D>,
+    data: &MeshData<D>,
     entities: &Entities<D>,
 ) -> Result<(), MeshWriteError> {
-    let count = mesh.cell_count() + entities.facets.iter().map(|e| e.facets.len()).sum::<usize>();
+    let (cell_count, each) = (data.mesh().cell_count(), data.nodes_per_cell());
+    let is_quadratic = data.quadratic().is_some();
+    let count = cell_count + entities.facets.iter().map(|e| e.facets.len()).sum::<usize>();
     to.text("$Elements\n");
     to.sizes([entities.cells.len() + entities.facets.len(), count, count.min(1), count]);
     to.line();
     for (at, (entity, cells)) in entities.cells_by_entity().enumerate() {
         to.ints([D, at + 1]);
-        to.put(element_type(D));
+        to.put(element_type(D, is_quadratic));
         to.size(entity.count);
         to.line();
         for cell in cells.iter().map(|&cell| cell as usize) {
             to.size(cell + 1);
-            for &corner in &mesh.corners()[cell * (D + 1)..(cell + 1) * (D + 1)] {
-                to.size(corner as usize + 1);
-            }
+            let nodes = &data.cell_nodes()[cell * each..(cell + 1) * each];
+            (0..each).for_each(|k| to.size(nodes[place(each, k)] as usize + 1));
             to.item()?;
         }
     }
-    let mut tag = mesh.cell_count();
+    let mut tag = cell_count;
     for (at, entity) in entities.facets.iter().enumerate() {
         to.ints([D - 1, at + 1]);
-        to.put(element_type(D - 1));
+        to.put(element_type(D - 1, is_quadratic));
         to.size(entity.facets.len());
         to.line();
         for facet in &entity.facets {
             tag += 1;
             to.size(tag);
-            facet.iter().for_each(|&corner| to.size(corner as usize + 1));
+            data.facet_nodes(facet).iter().for_each(|&node| to.size(node as usize + 1));
             to.item()?;
         }
     }
@@ -290,10 +292,10 @@ fn entities_41<W: Write, const D: usize>(
 
 fn nodes_22<W: Write, const D: usize>(
     to: &mut Numbers<W>,
-    mesh: &Mesh<D>,
+    points: &[[f64; D]],
 ) -> Result<(), MeshWriteError> {
-    to.text(&format!("$Nodes\n{}\n", mesh.points().len()));
-    for (i, p) in mesh.points().iter().enumerate() {
+    to.text(&format!("$Nodes\n{}\n", points.len()));
+    for (i, p) in points.iter().enumerate() {
         to.int(i + 1);
         to.point(p);
         to.item()?;
@@ -306,24 +308,26 @@ fn nodes_22<W: Write, const D: usize>(
 /// group in this version.
 fn elements_22<W: Write, const D: usize>(
     to: &mut Numbers<W>,
-    mesh: &Mesh<D>,
+    data: &MeshData<D>,
     entities: &Entities<D>,
 ) -> Result<(), MeshWriteError> {
-    let (cells, facets) = (mesh.cell_count(), entities.facet_count());
+    let (cells, facets) = (data.mesh().cell_count(), entities.facet_count());
+    let (each, is_quadratic) = (data.nodes_per_cell(), data.quadratic().is_some());
     to.text(&format!("$Elements\n{}\n", cells + facets));
     let text = to.encoding == MshEncoding::Text;
     if !text && cells > 0 {
-        to.put(element_type(D));
+        to.put(element_type(D, is_quadratic));
         to.ints([cells, 2]); // cells of that kind, each with two tags
     }
-    for (cell, corners) in mesh.cells().enumerate() {
+    for (cell, nodes) in data.cell_nodes().chunks_exact(each).enumerate() {
         let entity = entities.entity_of(cell);
         let physical = entities.cells[entity].physicals.first().copied().unwrap_or(0);
-        to.element_22(cell + 1, D, (physical, entity + 1), corners);
+        let kind = element_type(D, is_quadratic);
+        to.element_22(cell + 1, kind, (physical, entity + 1), nodes);
         to.item()?;
     }
     if !text && facets > 0 {
-        to.put(element_type(D - 1));
+        to.put(element_type(D - 1, is_quadratic));
         to.ints([facets, 2]);
     }
     let mut tag = cells;
@@ -331,7 +335,8 @@ fn elements_22<W: Write, const D: usize>(
         for &physical in &entity.physicals {
             for facet in &entity.facets {
                 tag += 1;
-                to.element_22(tag, D - 1, (physical, at + 1), facet);
+                let kind = element_type(D - 1, is_quadratic);
+                to.element_22(tag, kind, (physical, at + 1), &data.facet_nodes(facet));
                 to.item()?;
             }
         }

@@ -10,7 +10,7 @@ use super::super::column::{Column, Endian};
 use super::super::data::{Field, MeshData, Values};
 use super::super::{MeshWriteError, metadata};
 
-/// Writes a mesh as NPZ.
+/// Writes a mesh as NPZ; cells of second order as straight ones.
 ///
 /// # Errors
 /// If `out` cannot be written to or does not seek, or the watch ends the work.
@@ -28,7 +28,8 @@ pub fn write_npz<const D: usize>(
         Array::new("cells", "<u4", &[cells, D + 1], Column::slice(mesh.corners(), little)),
     ];
     for field in data.point_fields() {
-        let column = Column::values(field.values(), little);
+        // of cells of second order the corners, which come first
+        let column = Column::first_values(field.values(), points.len(), little);
         arrays.push(Array::new(field.name(), kind(field), &[points.len()], column));
     }
     for field in data.cell_fields() {

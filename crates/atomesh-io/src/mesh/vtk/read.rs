@@ -317,21 +317,23 @@ impl Cells {
                 malformed(0, format!("growing offsets at cell {cell}"), end.to_string())
             })?;
             start = end;
-            if !matches!((kind as u8, list.len()), (5, 3) | (10, 4)) {
+            if !matches!((kind as u8, list.len()), (5, 3) | (10, 4) | (22, 6) | (24, 10)) {
                 parts.skip_cell();
                 continue;
             }
-            let mut corners = [0; 4];
-            for (index, &corner) in corners.iter_mut().zip(list) {
-                *index = corner as u32;
-                if f64::from(*index) != corner {
+            let mut nodes = Vec::with_capacity(list.len());
+            for &corner in list {
+                let index = corner as u32;
+                if f64::from(index) != corner {
                     let expected = format!("an index below 2^32 in cell {cell}");
                     return Err(malformed(0, expected, corner.to_string()));
                 }
+                nodes.push(index);
             }
-            match list.len() {
-                3 => parts.add_triangle(&corners[..3]),
-                _ => parts.add_tetrahedron(&corners),
+            parts.has_quadratic |= nodes.len() > 4;
+            match nodes.len() {
+                3 | 6 => parts.add_triangle(&nodes[..3]),
+                _ => parts.add_tetrahedron(&nodes[..4]),
             }
         }
         Ok(())

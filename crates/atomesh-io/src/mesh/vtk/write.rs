@@ -20,8 +20,9 @@ pub fn write_vtk<const D: usize>(
     watch: &mut dyn Watch,
 ) -> Result<(), MeshWriteError> {
     let mesh = data.mesh();
-    let (points, cells) = (mesh.points().len(), mesh.cell_count());
-    let list = mesh.corners().len() + cells;
+    let (points, cells) = (data.nodes().len(), mesh.cell_count());
+    let (nodes, count) = (data.cell_nodes(), data.nodes_per_cell());
+    let list = nodes.len() + cells;
     let limit = i32::MAX as usize;
     if let Some(&count) = [points, list].iter().find(|&&n| n > limit) {
         return Err(MeshWriteError::TooMany { format: "VTK legacy", count, limit });
@@ -33,20 +34,19 @@ pub fn write_vtk<const D: usize>(
     writeln!(out, "FIELD FieldData 1\n{name} 1 {} unsigned_char\n{text}", text.len())?;
     check(watch, Phase::Write, 0.0, None)?;
     writeln!(out, "POINTS {points} double")?;
-    Column::points(mesh, big).write(out)?;
+    Column::points(data.nodes(), big).write(out)?;
     check(watch, Phase::Write, 0.3, None)?;
     writeln!(out, "\nCELLS {cells} {list}")?;
-    let corners = mesh.corners();
-    let each = Column::new(cells, 4 * (D + 2), move |range, bytes| {
-        for cell in corners[range.start * (D + 1)..range.end * (D + 1)].chunks_exact(D + 1) {
-            let numbers = std::iter::once(D as u32 + 1).chain(cell.iter().copied());
+    let each = Column::new(cells, 4 * (count + 1), move |range, bytes| {
+        for cell in nodes[range.start * count..range.end * count].chunks_exact(count) {
+            let numbers = std::iter::once(count as u32).chain(cell.iter().copied());
             bytes.extend(numbers.flat_map(u32::to_be_bytes));
         }
     });
     each.write(out)?;
     check(watch, Phase::Write, 0.7, None)?;
     writeln!(out, "\nCELL_TYPES {cells}")?;
-    let kind = i32::from(vtu::cell_type(D));
+    let kind = i32::from(vtu::cell_type(count));
     Column::numbers(cells, big, move |_| kind).write(out)?;
     writeln!(out, "\nPOINT_DATA {points}")?;
     fields(out, data.point_fields())?;

@@ -11,7 +11,12 @@ pub use cells::write_cells_vtu;
 pub use read::read_vtu;
 pub use write::write_vtu;
 
-/// VTK's number for a triangle (`dimension` 2) or a tetrahedron (3).
-pub(super) fn cell_type(dimension: usize) -> u8 {
-    if dimension == 2 { 5 } else { 10 }
+/// VTK's number for a cell of so many points: a triangle or tetrahedron, or one of second order.
+pub(super) fn cell_type(node_count: usize) -> u8 {
+    match node_count {
+        3 => 5,
+        4 => 10,
+        6 => 22,
+        _ => 24,
+    }
 }

@@ -324,16 +324,18 @@ impl Piece<'_> {
             })?;
             start = end as usize;
             match (kind, list.len()) {
-                (5, 3) => {
-                    parts.add_triangle(list);
+                (5, 3) | (22, 6) => {
+                    parts.add_triangle(&list[..3]);
                     parts.tags.triangle_regions.push(region_of(cell));
+                    parts.has_quadratic |= kind == 22;
                 }
-                (10, 4) => {
-                    parts.add_tetrahedron(list);
+                (10, 4) | (24, 10) => {
+                    parts.add_tetrahedron(&list[..4]);
                     parts.tags.tetrahedron_regions.push(region_of(cell));
+                    parts.has_quadratic |= kind == 24;
                 }
-                (5 | 10, found) => {
-                    let expected = format!("3 or 4 corners of cell {cell}");
+                (5 | 10 | 22 | 24, found) => {
+                    let expected = format!("3, 4, 6 or 10 points of cell {cell}");
                     return Err(malformed(self.at, expected, found.to_string()));
                 }
                 _ => parts.skip_cell(),

@@ -89,7 +89,7 @@ impl TagArrays {
 /// Names the arrays of the mesh and its fields.
 fn piece<'a, const D: usize>(head: &mut Head<'a>, data: &MeshData<'a, D>) {
     let mesh = data.mesh();
-    let (points, cells, corners) = (mesh.points().len(), mesh.cell_count(), mesh.corners());
+    let (points, cells, corners) = (data.nodes().len(), mesh.cell_count(), data.cell_nodes());
     head.text(&format!("<Piece NumberOfPoints=\"{points}\" NumberOfCells=\"{cells}\">\n"));
     head.fields("PointData", data.point_fields());
     let regions = data.tags().and_then(Tags::regions);
@@ -97,9 +97,9 @@ fn piece<'a, const D: usize>(head: &mut Head<'a>, data: &MeshData<'a, D>) {
     head.cell_data(data.cell_fields(), region);
     head.text("<Points>\n");
     let vectors = "NumberOfComponents=\"3\"";
-    head.array("Float64", "Points", vectors, Column::points(mesh, Endian::Little));
+    head.array("Float64", "Points", vectors, Column::points(data.nodes(), Endian::Little));
     head.text("</Points>\n<Cells>\n");
-    let each = D + 1;
+    let each = data.nodes_per_cell();
     if fits_i32(corners.len().max(points)) {
         let ends = Column::numbers(cells, Endian::Little, move |i| ((i + 1) * each) as i32);
         head.array("Int32", "connectivity", "", Column::slice(corners, Endian::Little));
@@ -110,7 +110,7 @@ fn piece<'a, const D: usize>(head: &mut Head<'a>, data: &MeshData<'a, D>) {
         head.array("Int64", "connectivity", "", wide);
         head.array("Int64", "offsets", "", ends);
     }
-    let kind = super::cell_type(D);
+    let kind = super::cell_type(each);
     head.array("UInt8", "types", "", Column::numbers(cells, Endian::Little, move |_| kind));
     head.text("</Cells>\n</Piece>\n");
 }

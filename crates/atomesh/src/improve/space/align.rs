@@ -12,7 +12,9 @@ use super::valley::{Contrast, LEAST_DEPTH, System, Valley, worth};
 use crate::geometry::{Point, distance_squared};
 
 /// What a cell's shape weighs against a facet's depth.
-pub(super) fn stiffness() -> f64 { std::env::var("STIFF").ok().and_then(|s| s.parse().ok()).unwrap_or(0.15) }
+pub(super) fn stiffness() -> f64 {
+    std::env::var("STIFF").ok().and_then(|s| s.parse().ok()).unwrap_or(0.15)
+}
 /// What a swap must gain, so that none goes in circles.
 const GAIN: f64 = 1e-3;
 /// What a move must gain, and the share of the edges' length that it must go.
@@ -28,9 +30,19 @@ const DEEPER: f64 = 0.05;
 /// Where on an edge valleys are looked for.
 const SHARES: [f64; 5] = [0.17, 0.33, 0.5, 0.67, 0.83];
 /// A point this deep, between the least and the greatest depth around, may be a corner of a facet in the valley.
-fn near() -> f64 { static N: std::sync::LazyLock<f64> = std::sync::LazyLock::new(|| std::env::var("NEAR").ok().and_then(|s| s.parse().ok()).unwrap_or(0.2)); *N }
+fn near() -> f64 {
+    static N: std::sync::LazyLock<f64> = std::sync::LazyLock::new(|| {
+        std::env::var("NEAR").ok().and_then(|s| s.parse().ok()).unwrap_or(0.2)
+    });
+    *N
+}
 
-fn own() -> f64 { static N: std::sync::LazyLock<f64> = std::sync::LazyLock::new(|| std::env::var("OWN").ok().and_then(|s| s.parse().ok()).unwrap_or(1.0)); *N }
+fn own() -> f64 {
+    static N: std::sync::LazyLock<f64> = std::sync::LazyLock::new(|| {
+        std::env::var("OWN").ok().and_then(|s| s.parse().ok()).unwrap_or(1.0)
+    });
+    *N
+}
 /// What alignment works with.
 pub(super) struct Aligner<'a> {
     pub valley: &'a Valley<'a>,
@@ -57,7 +69,11 @@ impl Aligner<'_> {
     /// What a cell costs; more than anything gains if it is below the floor.
     fn cost(&self, patch: &Patch, corners: &[u32; 4]) -> f64 {
         let shape = patch.shape_of(corners);
-        if shape.cosine > self.floor { f64::INFINITY } else { self.stiffness * (1.0 - shape.quality) }
+        if shape.cosine > self.floor {
+            f64::INFINITY
+        } else {
+            self.stiffness * (1.0 - shape.quality)
+        }
     }
 
     /// What a cell that is there costs; one below the floor is not held against those that replace it.
@@ -168,7 +184,8 @@ impl Aligner<'_> {
         }
         let [[d, p, q, e], [_, _, r, _], _] = cells;
         let at = |point: u32| &patch.points[point as usize];
-        let edges = [p, q, r].map(|x| distance_squared(at(x), at(d)) + distance_squared(at(x), at(e)));
+        let edges =
+            [p, q, r].map(|x| distance_squared(at(x), at(d)) + distance_squared(at(x), at(e)));
         let mut contrast = Contrast::NONE;
         [p, q, r, d, e].iter().for_each(|&p| contrast.include(self.depths[p as usize]));
         contrast.include(self.on_way(patch, d, e, 0.5));
@@ -217,7 +234,8 @@ impl Aligner<'_> {
         let size = room.size_squared(&at);
         let mut system = System::default();
         let scale = Scale { area: 1.0 / size, contrast };
-        let (mut now, mut worst) = (own() * contrast.of(self.depths[point as usize]).powi(2), -1.0_f64);
+        let (mut now, mut worst) =
+            (own() * contrast.of(self.depths[point as usize]).powi(2), -1.0_f64);
         for (rim, mean) in room.rims.iter().zip(&room.means) {
             let facet = [at, rim[0], rim[1]];
             self.valley.pull(&facet, *mean, &contrast, &mut system);
@@ -235,12 +253,14 @@ impl Aligner<'_> {
             (0..3).filter(|k| freedom >> k & 1 == 0).for_each(|k| shift[k] = 0.0);
             Some((shift, [1.0, 0.6]))
         };
-        for n in 0..(if std::env::var("NOFALL").is_ok() {1} else {2}) {
+        for n in 0..(if std::env::var("NOFALL").is_ok() { 1 } else { 2 }) {
             let Some((shift, shares)) = (if n == 0 { fitted } else { fallen() }) else { continue };
             if shift.iter().map(|x| x * x).sum::<f64>() < LEAST_MOVE * LEAST_MOVE * size {
                 continue;
             }
-            let is_fine = n == 0 && std::env::var("NOFINE").is_err() && shift.iter().map(|x| x * x).sum::<f64>() < FINE * FINE * size;
+            let is_fine = n == 0
+                && std::env::var("NOFINE").is_err()
+                && shift.iter().map(|x| x * x).sum::<f64>() < FINE * FINE * size;
             for share in shares {
                 let to = std::array::from_fn(|k| at[k] + share * shift[k]);
                 let Some(cost) = self.cost_at(room, &to, limit) else { continue };

@@ -82,7 +82,8 @@ fn swap_away(patch: &mut Patch, cell: u32) -> bool {
     }
     for k in 0..4 {
         if let Some(cells) = through_facet(patch, cell, k) {
-            let worth = cells.iter().map(|c| -patch.shape_of(c).cosine).fold(f64::INFINITY, f64::min);
+            let worth =
+                cells.iter().map(|c| -patch.shape_of(c).cosine).fold(f64::INFINITY, f64::min);
             if worth > least {
                 least = worth;
                 best = Some(Swap::Facet(cell, k));

@@ -56,10 +56,15 @@ impl Improver<3> for Space {
         let mut pending: Option<Vec<bool>> = None;
         for (pass, &cut) in CUTS.iter().enumerate() {
             check(watch, Phase::Improve, pass as f64 / CUTS.len() as f64, None)?;
-            let t=std::time::Instant::now();
+            let t = std::time::Instant::now();
             let divided = whole.divide(cut, pending.as_deref());
             let valences = whole.valences();
-            eprintln!("divide {:?} {} parts {} cells", t.elapsed(), divided.len(), divided.iter().map(|d|d.len()).sum::<usize>());
+            eprintln!(
+                "divide {:?} {} parts {} cells",
+                t.elapsed(),
+                divided.len(),
+                divided.iter().map(|d| d.len()).sum::<usize>()
+            );
             let work = |cells: &Vec<u32>| {
                 let mut part = whole.part(cells, &valences, pending.as_deref());
                 let mut effort = Effort::default();
@@ -67,19 +72,35 @@ impl Improver<3> for Space {
                 heal(&mut part.patch, floor, 6, &mut effort);
                 let t1 = t.elapsed();
                 let depths = part.patch.points.iter().map(|p| valley.depth(p)).collect();
-                let mut aligner = align::Aligner { valley: &valley, floor, stiffness: align::stiffness(), depths };
-                let t=std::time::Instant::now(); let sweeps = std::env::var("SWEEPS").ok().and_then(|s| s.parse().ok()).unwrap_or(2);
+                let mut aligner = align::Aligner {
+                    valley: &valley,
+                    floor,
+                    stiffness: align::stiffness(),
+                    depths,
+                };
+                let t = std::time::Instant::now();
+                let sweeps = std::env::var("SWEEPS").ok().and_then(|s| s.parse().ok()).unwrap_or(2);
                 for _ in 0..sweeps {
-                    if std::env::var("NOSWAP").is_err() { aligner.swap(&mut part.patch, &part.open, &mut effort); }
-                    if options.align == super::Align::Full { aligner.moves(&mut part.patch, &part.open, &mut effort); }
+                    if std::env::var("NOSWAP").is_err() {
+                        aligner.swap(&mut part.patch, &part.open, &mut effort);
+                    }
+                    if options.align == super::Align::Full {
+                        aligner.moves(&mut part.patch, &part.open, &mut effort);
+                    }
                 }
                 let t2 = t.elapsed();
                 heal(&mut part.patch, floor, 6, &mut effort);
-                if std::env::var("TIME").is_ok() { eprintln!("heal {t1:?} align {:?} heal {:?}", t2-t1, t.elapsed()-t2); }
+                if std::env::var("TIME").is_ok() {
+                    eprintln!("heal {t1:?} align {:?} heal {:?}", t2 - t1, t.elapsed() - t2);
+                }
                 (part, effort)
             };
             let done: Vec<(Part, Effort)> = divided.par_iter().map(work).collect();
-            eprintln!("done {:?} {:?}", t.elapsed(), done.iter().map(|d|(d.1.swaps,d.1.moves,d.1.rounds)).collect::<Vec<_>>());
+            eprintln!(
+                "done {:?} {:?}",
+                t.elapsed(),
+                done.iter().map(|d| (d.1.swaps, d.1.moves, d.1.rounds)).collect::<Vec<_>>()
+            );
             let mut held = vec![false; whole.points.len()];
             for (part, effort) in &done {
                 report.swaps += effort.swaps;

@@ -126,7 +126,8 @@ impl Patch {
             let (corners, neighbours) = (&self.corners[cell], &self.neighbours[cell]);
             for k in 0..4 {
                 let other = neighbours[k];
-                if corners[k] != point && other != NONE && self.seen[other as usize] != self.search {
+                if corners[k] != point && other != NONE && self.seen[other as usize] != self.search
+                {
                     self.seen[other as usize] = self.search;
                     cells.push(other);
                 }

@@ -160,7 +160,8 @@ impl<'a> Valley<'a> {
             }
         }
         // of a Gaussian, two steps to both sides of its middle
-        let ratio = 2.0 * contrast.of(depths[deepest]) / (contrast.of(depths[0]) + contrast.of(depths[4]));
+        let ratio =
+            2.0 * contrast.of(depths[deepest]) / (contrast.of(depths[0]) + contrast.of(depths[4]));
         let variance = if ratio > 1.6 { 2.0 / ratio.min(50.0).ln() } else { 0.0 };
         let step = self.step;
         Bottom { offset: offset * step, depth: depths[deepest], variance: variance * step * step }
@@ -233,7 +234,14 @@ pub(super) struct System {
 }
 
 impl System {
-    pub fn debug(&self) -> f64 { let q = dot(&self.normal,&self.normal); if q > 0.9*self.count*self.count { dot(&self.growth, &self.normal)/q.sqrt()/self.weight } else { -q/(self.count*self.count) } }
+    pub fn debug(&self) -> f64 {
+        let q = dot(&self.normal, &self.normal);
+        if q > 0.9 * self.count * self.count {
+            dot(&self.growth, &self.normal) / q.sqrt() / self.weight
+        } else {
+            -q / (self.count * self.count)
+        }
+    }
 
     /// Adds the wish that `share` of the move, along a unit vector, be `offset`.
     #[inline]
@@ -267,7 +275,10 @@ impl System {
         let mut right = self.right;
         let square = dot(&self.normal, &self.normal);
         let lift = dot(&self.growth, &self.normal) / square;
-        if square > 0.9 * self.count * self.count && lift.is_finite() && std::env::var("NOLIFT").is_err() {
+        if square > 0.9 * self.count * self.count
+            && lift.is_finite()
+            && std::env::var("NOLIFT").is_err()
+        {
             (0..3).for_each(|k| right[k] += lift * self.normal[k]);
         }
         for k in 0..3 {
