@@ -67,6 +67,16 @@ fn line(text: &mut String, name: &str, value: impl std::fmt::Display) {
     let _ = writeln!(text, "{name:<10} {value}");
 }
 
+/// The first of some names, and how many more there are.
+fn listed(names: impl Iterator<Item = String>, count: usize) -> String {
+    const MOST: usize = 12;
+    let mut text = names.take(MOST).collect::<Vec<_>>().join(", ");
+    if count > MOST {
+        let _ = write!(text, " and {} more", count - MOST);
+    }
+    text
+}
+
 /// Numbers as options take them.
 fn list<T: std::fmt::Display>(numbers: &[T]) -> String {
     numbers.iter().map(T::to_string).collect::<Vec<_>>().join(",")
@@ -137,12 +147,14 @@ fn mesh_text<const D: usize>(
         let value = format!("{}, {least} to {greatest}", field.name);
         line(&mut text, "field", value);
     }
-    for group in loaded.tags.facet_groups() {
-        line(&mut text, "facets", format_args!("{}, {}", group.name, group.facets.len()));
+    let groups = loaded.tags.facet_groups();
+    if !groups.is_empty() {
+        let named = groups.iter().map(|group| format!("{} {}", group.name, group.facets.len()));
+        line(&mut text, "facets", listed(named, groups.len()));
     }
     if let Some(regions) = loaded.tags.regions() {
-        let names: Vec<_> = regions.ids().iter().map(|&id| regions.name(id)).collect();
-        line(&mut text, "regions", names.join(", "));
+        let ids = regions.ids();
+        line(&mut text, "regions", listed(ids.iter().map(|&id| regions.name(id)), ids.len()));
     }
     if let Some(frame) = &loaded.frame {
         line(&mut text, "image", format_args!("{} samples", list(&frame.shape())));

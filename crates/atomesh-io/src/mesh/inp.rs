@@ -197,7 +197,7 @@ pub fn read_inp(bytes: &[u8]) -> Result<AnyMesh, MeshReadError> {
     for line in bytes.split(|&b| b == b'\n') {
         let text = std::str::from_utf8(line)
             .map_err(|_| malformed(at, "text", line.escape_ascii().to_string()))?;
-        reader.line(text.trim(), at)?;
+        reader.line(text.trim_end_matches('\r'), at)?;
         at += line.len() + 1;
     }
     reader.finish()
@@ -209,8 +209,8 @@ enum Section {
     #[default]
     Other,
     Nodes,
-    /// Elements of so many corners.
-    Elements(usize),
+    /// Elements of so many corners, and the place of the set that they are in.
+    Elements(usize, Option<usize>),
     /// The named set.
     Set(String),
     /// The named surface.
@@ -235,11 +235,13 @@ struct Reader {
 impl Reader {
     fn line(&mut self, text: &str, at: usize) -> Result<(), MeshReadError> {
         if let Some(comment) = text.strip_prefix("**") {
-            self.comment(comment);
-        } else if let Some(keyword) = text.strip_prefix('*') {
-            self.section = self.keyword(keyword);
-        } else if !text.is_empty() {
-            self.data(text, at)?;
+            self.comment(comment); // a part of a text may end in blanks
+            return Ok(());
+        }
+        match text.trim().strip_prefix('*') {
+            Some(keyword) => self.section = self.keyword(keyword),
+            None if text.trim().is_empty() => {}
+            None => self.data(text.trim(), at)?,
         }
         Ok(())
     }
@@ -272,11 +274,20 @@ impl Reader {
         };
         match keyword.as_str() {
             "NODE" => Section::Nodes,
-            "ELEMENT" => match option("TYPE").as_str() {
-                "c3d4" => Section::Elements(4),
-                "cps3" | "cpe3" | "cax3" | "s3" | "stri3" => Section::Elements(3),
-                _ => Section::Elements(0),
-            },
+            "ELEMENT" => {
+                let count = match option("TYPE").as_str() {
+                    "c3d4" => 4,
+                    "cps3" | "cpe3" | "cax3" | "s3" | "stri3" => 3,
+                    _ => 0,
+                };
+                let name = option("ELSET");
+                let named = !name.is_empty() && name != CELLS;
+                let set = named.then(|| {
+                    self.sets.push((name, Vec::new()));
+                    self.sets.len() - 1
+                });
+                Section::Elements(count, set)
+            }
             "ELSET" => {
                 let name = option("ELSET");
                 self.sets.push((name.clone(), Vec::new()));
@@ -306,8 +317,8 @@ impl Reader {
                 self.index_of.insert(number, index);
                 self.parts.points.push(point);
             }
-            Section::Elements(0) => self.parts.skipped_cells += 1,
-            &Section::Elements(count) => {
+            Section::Elements(0, _) => self.parts.skipped_cells += 1,
+            &Section::Elements(count, set) => {
                 let numbers: Vec<u64> = words().map(whole).collect::<Result<_, _>>()?;
                 let [number, corners @ ..] = &numbers[..] else { return Err(wrong("an element")) };
                 if corners.len() != count {
@@ -318,6 +329,9 @@ impl Reader {
                     _ => &mut self.parts.tetrahedra,
                 };
                 self.elements.insert(*number, (kept.len(), count));
+                if let Some(set) = set {
+                    self.sets[set].1.push(*number);
+                }
                 for corner in corners {
                     let index = self.index_of.get(corner).copied();
                     kept.push(index.ok_or_else(|| wrong("nodes that stand before"))?);

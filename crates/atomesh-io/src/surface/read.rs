@@ -5,6 +5,8 @@ use std::path::Path;
 use std::str::FromStr;
 
 use super::{SurfaceFormat, SurfaceWriteError};
+use crate::mesh::MeshReadError;
+use crate::mesh::vtu::poly::read_poly;
 
 /// Points with the lines or triangles between them, and the name of the group of each.
 #[derive(Clone, Debug, Default, PartialEq)]
@@ -25,11 +27,14 @@ pub struct LoadedSurface {
 #[non_exhaustive]
 pub enum SurfaceReadError {
     /// The name calls for no format that is read.
-    #[error("{0:?} is no surface file that is read; expected .stl, .obj, .ply, .ts or .pl")]
+    #[error("{0:?} is no surface file that is read; expected .vtp, .stl, .obj, .ply, .ts or .pl")]
     Format(std::path::PathBuf),
     /// The system did not give the bytes.
     #[error("the surface could not be read: {0}")]
     Io(#[from] io::Error),
+    /// The bytes are no VTP file.
+    #[error(transparent)]
+    Vtp(#[from] MeshReadError),
     /// The bytes are not what the format says.
     #[error("expected {expected}, found {found:?}")]
     Malformed {
@@ -44,7 +49,7 @@ fn malformed(expected: &'static str, found: impl Into<String>) -> SurfaceReadErr
     SurfaceReadError::Malformed { expected, found: found.into() }
 }
 
-/// Reads a surface in the format that the name calls for: STL (binary or text), OBJ (lines and triangles), PLY
+/// Reads a surface in the format that the name calls for: VTP (one piece of lines and triangles), STL (binary or text), OBJ (lines and triangles), PLY
 /// as it is written here, GOCAD's TSurf and PLine.
 ///
 /// # Errors
@@ -61,7 +66,7 @@ pub fn read_surface(path: &Path) -> Result<LoadedSurface, SurfaceReadError> {
         SurfaceFormat::Obj => obj(&text(&bytes)?),
         SurfaceFormat::Ply => ply(&bytes),
         SurfaceFormat::TSurf | SurfaceFormat::PLine => gocad(&text(&bytes)?),
-        SurfaceFormat::Vtp => return Err(SurfaceReadError::Format(path.into())),
+        SurfaceFormat::Vtp => Ok(read_poly(&bytes)?),
     }?;
     let count = surface.points.len();
     let corners = surface.lines.as_flattened().iter().chain(surface.triangles.as_flattened());

@@ -87,7 +87,7 @@ impl<const D: usize> Piece<'_, D> {
                 // the side opposite to a corner runs up or down by the parity of the corner's number; two
                 // facets agree if they run along their ridge against each other
                 let agree = (opposite + usize::from(off)) % 2 == 1;
-                let wanted = own != !agree;
+                let wanted = own == agree;
                 match turned[local(next)] {
                     Some(found) => orientable &= found == wanted,
                     None => {

@@ -3,6 +3,7 @@
 pub(crate) mod appended;
 mod array;
 mod cells;
+pub(crate) mod poly;
 mod read;
 mod write;
 mod xml;

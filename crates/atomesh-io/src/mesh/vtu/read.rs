@@ -14,7 +14,7 @@ use super::xml::{Event, Scanner, Tag, find};
 /// [`MeshReadError`] if the bytes are not such a file. No count in the file makes this allocate more
 /// than the file's own data call for.
 pub fn read_vtu(bytes: &[u8]) -> Result<AnyMesh, MeshReadError> {
-    let document = Document::parse(bytes)?;
+    let document = Document::parse(bytes, "UnstructuredGrid")?;
     let mut parts = Parts::default();
     if let Some(array) = document.field_data.iter().find(|a| a.name == metadata::NAME) {
         parts.metadata = Metadata::decode(&array.string()?);
@@ -29,20 +29,25 @@ pub fn read_vtu(bytes: &[u8]) -> Result<AnyMesh, MeshReadError> {
 }
 
 /// The arrays of a file, found but not read.
-struct Document<'a> {
-    field_data: Vec<Array<'a>>,
-    pieces: Vec<Piece<'a>>,
+pub(super) struct Document<'a> {
+    pub field_data: Vec<Array<'a>>,
+    pub pieces: Vec<Piece<'a>>,
 }
 
 #[derive(Default)]
-struct Piece<'a> {
-    at: usize,
-    points: usize,
-    cells: usize,
-    coordinates: Vec<Array<'a>>,
+pub(super) struct Piece<'a> {
+    pub at: usize,
+    pub points: usize,
+    /// The number of cells; in poly data that of lines and polygons.
+    pub cells: usize,
+    pub coordinates: Vec<Array<'a>>,
+    /// The connectivity and offsets of lines, and of polygons.
+    pub lines: Vec<Array<'a>>,
+    pub polygons: Vec<Array<'a>>,
+    pub counts: [usize; 2],
     topology: Vec<Array<'a>>,
     point_data: Vec<Array<'a>>,
-    cell_data: Vec<Array<'a>>,
+    pub cell_data: Vec<Array<'a>>,
 }
 
 /// Where the appended data begin, and whether they are base64.
@@ -53,13 +58,14 @@ struct Appended {
 }
 
 impl<'a> Document<'a> {
-    fn parse(bytes: &'a [u8]) -> Result<Self, MeshReadError> {
+    /// Finds the arrays of a file of VTK's `kind`.
+    pub fn parse(bytes: &'a [u8], kind: &'static str) -> Result<Self, MeshReadError> {
         let mut scanner = Scanner::new(bytes);
         let root = match scanner.next()? {
             Event::Open(tag) if tag.name == "VTKFile" => tag,
             _ => return Err(malformed(0, "<VTKFile>", excerpt(bytes, 0))),
         };
-        let layout = layout(&root)?;
+        let layout = layout(&root, kind)?;
         let mut document = Self { field_data: vec![], pieces: vec![] };
         let mut section = "";
         let mut appended = None;
@@ -71,15 +77,9 @@ impl<'a> Document<'a> {
                         appended = Some(Appended::locate(bytes, scanner.at(), &tag)?);
                         break; // raw data are no XML
                     }
-                    "Piece" => document.pieces.push(Piece {
-                        at: tag.at,
-                        points: tag.count("NumberOfPoints")?,
-                        cells: tag.count("NumberOfCells")?,
-                        ..Piece::default()
-                    }),
-                    "FieldData" | "PointData" | "CellData" | "Points" | "Cells" => {
-                        section = tag.name
-                    }
+                    "Piece" => document.pieces.push(Piece::new(&tag, kind)?),
+                    "FieldData" | "PointData" | "CellData" | "Points" | "Cells" | "Lines"
+                    | "Polys" | "Verts" | "Strips" => section = tag.name,
                     "DataArray" => {
                         pending.push((section, document.pieces.len(), tag, scanner.at()))
                     }
@@ -107,6 +107,8 @@ impl<'a> Document<'a> {
             ("FieldData", _) => self.field_data.push(array()?),
             ("Points", Some(piece)) => piece.coordinates.push(array()?),
             ("Cells", Some(piece)) => piece.topology.push(array()?),
+            ("Lines", Some(piece)) => piece.lines.push(array()?),
+            ("Polys", Some(piece)) => piece.polygons.push(array()?),
             ("PointData", Some(piece)) => piece.point_data.push(array()?),
             ("CellData", Some(piece)) => piece.cell_data.push(array()?),
             _ => {}
@@ -155,13 +157,13 @@ impl<'a> Document<'a> {
     }
 }
 
-fn layout(root: &Tag) -> Result<Layout, MeshReadError> {
+fn layout(root: &Tag, kind: &'static str) -> Result<Layout, MeshReadError> {
     let unsupported = |what, found: &str, expected| {
         Err(MeshReadError::Unsupported { what, found: found.into(), expected })
     };
     match root.get("type") {
-        Some("UnstructuredGrid") => {}
-        other => return unsupported("VTK file type", other.unwrap_or(""), "UnstructuredGrid"),
+        Some(found) if found == kind => {}
+        other => return unsupported("VTK file type", other.unwrap_or(""), kind),
     }
     let compressed = match root.get("compressor") {
         None | Some("") => false,
@@ -258,6 +260,17 @@ fn append<T: Clone>(fields: &mut Vec<OwnedField<T>>, more: Vec<OwnedField<T>>, f
 }
 
 impl Piece<'_> {
+    fn new(tag: &Tag, kind: &str) -> Result<Self, MeshReadError> {
+        let points = tag.count("NumberOfPoints")?;
+        let mut piece = Self { at: tag.at, points, ..Self::default() };
+        if kind == "PolyData" {
+            piece.counts = [tag.count("NumberOfLines")?, tag.count("NumberOfPolys")?];
+        } else {
+            piece.cells = tag.count("NumberOfCells")?;
+        }
+        Ok(piece)
+    }
+
     /// Appends the piece's points, cells and scalar fields; fields that not all pieces have are dropped.
     fn add_to(&self, parts: &mut Parts, first: bool) -> Result<(), MeshReadError> {
         let base = u32::try_from(parts.points.len()).ok();
@@ -344,7 +357,7 @@ impl Piece<'_> {
         Ok(())
     }
 
-    fn count_of(&self, items: usize, each: usize) -> Result<usize, MeshReadError> {
+    pub fn count_of(&self, items: usize, each: usize) -> Result<usize, MeshReadError> {
         let count = items.checked_mul(each);
         count.ok_or_else(|| malformed(self.at, "a count in memory's reach", items.to_string()))
     }

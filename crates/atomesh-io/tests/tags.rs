@@ -1,0 +1,219 @@
+//! Tags go through every format that holds them, and stay as they were.
+
+use atomesh::geometry::Bounds;
+use atomesh::mesh::{Delaunay, FacetGroup, Mesh, Regions, Tags};
+use atomesh::watch::Silent;
+use atomesh_io::mesh::inp::read_inp;
+use atomesh_io::mesh::msh::{MshEncoding, MshVersion, read_msh};
+use atomesh_io::mesh::vtu::read_vtu;
+use atomesh_io::mesh::{
+    AnyMesh, LoadedMesh, MeshData, MeshFormat, Provenance, read_mesh, write_mesh_as,
+};
+use proptest::prelude::*;
+
+/// Rows of points, 0 to `n` along every axis, shifted inside.
+fn points<const D: usize>(n: usize) -> Vec<[f64; D]> {
+    (0..(n + 1).pow(D as u32))
+        .map(|i| {
+            let index: [usize; D] = std::array::from_fn(|k| i / (n + 1).pow(k as u32) % (n + 1));
+            let inside = |k: usize| index[k] > 0 && index[k] < n;
+            std::array::from_fn(|k| {
+                let shift = if inside(k) { 0.2 * ((i * 7 + k) as f64).sin() } else { 0.0 };
+                index[k] as f64 + shift
+            })
+        })
+        .collect()
+}
+
+/// The sides, a group that shares a facet with one of them, and one inside with facets turned both ways.
+fn tagged<const D: usize>(mesh: &Mesh<D>, regions: Option<Regions>) -> Tags<D> {
+    let sides = Tags::sides(mesh, &Bounds::of(mesh.points()).unwrap(), 0.0);
+    let shared = sides.facet_group("xmin").unwrap().facets[..1].to_vec();
+    let inside = mesh.facets().into_iter().filter(|facet| facet.neighbour.is_some()).take(5);
+    let turned = inside.enumerate().map(|(i, facet)| {
+        let mut corners = facet.corners;
+        if i % 2 == 0 {
+            corners.swap(D - 2, D - 1);
+        }
+        corners
+    });
+    let groups = vec![
+        FacetGroup { id: 20, name: "inlet".into(), facets: shared },
+        FacetGroup { id: 11, name: "feature-1".into(), facets: turned.collect() },
+    ];
+    sides.merge(Tags::new(mesh, groups, regions).unwrap()).unwrap()
+}
+
+fn regions(cells: usize, names: &[(i32, &str)]) -> Regions {
+    let of_cells = (0..cells).map(|cell| [3, -1, 0, 8][cell % 4]).collect();
+    let names = names.iter().map(|(id, name)| (*id, (*name).to_string())).collect();
+    Regions { of_cells, names }
+}
+
+const FORMATS: [(&str, MeshFormat); 6] = [
+    ("a.vtu", MeshFormat::Vtu),
+    ("a.inp", MeshFormat::Inp),
+    ("a.msh", MeshFormat::Msh(MshVersion::V41, MshEncoding::Binary)),
+    ("b.msh", MeshFormat::Msh(MshVersion::V41, MshEncoding::Text)),
+    ("a.msh2", MeshFormat::Msh(MshVersion::V22, MshEncoding::Binary)),
+    ("b.msh2", MeshFormat::Msh(MshVersion::V22, MshEncoding::Text)),
+];
+
+/// The groups by id, each with its facets as sets of corners that run in one way.
+fn canonical<const D: usize>(tags: &Tags<D>) -> Vec<(u32, String, Vec<[u32; D]>)> {
+    let mut groups: Vec<_> = (tags.facet_groups().iter())
+        .map(|group| {
+            let mut facets: Vec<[u32; D]> = group.facets.clone();
+            if D == 3 {
+                // where a triangle begins is of no matter
+                for facet in &mut facets {
+                    let least = (0..D).min_by_key(|&k| facet[k]).unwrap();
+                    facet.rotate_left(least);
+                }
+            }
+            facets.sort_unstable();
+            (group.id, group.name.clone(), facets)
+        })
+        .collect();
+    groups.sort();
+    groups
+}
+
+fn check<const D: usize>(
+    mesh: &Mesh<D>,
+    tags: &Tags<D>,
+    pick: impl Fn(AnyMesh) -> Option<LoadedMesh<D>>,
+) {
+    let folder = tempfile::tempdir().unwrap();
+    let provenance =
+        Provenance { version: "0.1.0".into(), options: serde_json::json!({}), seed: 7 };
+    let data = MeshData::new(mesh).with_tags(tags).with_provenance(&provenance);
+    for (name, format) in FORMATS {
+        let path = folder.path().join(name);
+        write_mesh_as(&path, format, &data, &mut Silent).unwrap();
+        let read = pick(read_mesh(&path).unwrap_or_else(|e| panic!("{name}: {e}"))).unwrap();
+        assert_eq!(&read.mesh, mesh, "{name}");
+        assert_eq!(read.skipped_cells, 0, "{name}");
+        assert_eq!(read.provenance.as_ref(), Some(&provenance), "{name}");
+        assert_eq!(read.tags.regions(), tags.regions(), "{name}");
+        let (found, expected) = (canonical(&read.tags), canonical(tags));
+        assert_eq!(found, expected, "{name}");
+    }
+}
+
+fn flat(any: AnyMesh) -> Option<LoadedMesh<2>> {
+    if let AnyMesh::Flat(loaded) = any { Some(loaded) } else { None }
+}
+
+fn volume(any: AnyMesh) -> Option<LoadedMesh<3>> {
+    if let AnyMesh::Volume(loaded) = any { Some(loaded) } else { None }
+}
+
+#[test]
+fn groups_alone_are_read_as_they_were_written() {
+    let mesh = Delaunay::<2>::new().connect(&points(4), &mut Silent).unwrap();
+    check(&mesh, &tagged(&mesh, None), flat);
+    let mesh = Delaunay::<3>::new().connect(&points(3), &mut Silent).unwrap();
+    check(&mesh, &tagged(&mesh, None), volume);
+}
+
+#[test]
+fn regions_keep_their_numbers_even_those_below_one_and_their_names() {
+    let names = [(3, "salt"), (-1, "outside")];
+    let mesh = Delaunay::<2>::new().connect(&points(4), &mut Silent).unwrap();
+    check(&mesh, &tagged(&mesh, Some(regions(mesh.cell_count(), &names))), flat);
+    let mesh = Delaunay::<3>::new().connect(&points(3), &mut Silent).unwrap();
+    check(&mesh, &tagged(&mesh, Some(regions(mesh.cell_count(), &names))), volume);
+    let alone = Tags::new(&mesh, vec![], Some(regions(mesh.cell_count(), &[]))).unwrap();
+    check(&mesh, &alone, volume);
+}
+
+#[test]
+fn groups_of_other_programs_get_names_that_fit() {
+    let text = "$MeshFormat\n2.2 0 8\n$EndMeshFormat\n\
+        $PhysicalNames\n3\n1 1 \"Inlet left\"\n1 2 \"Inlet_left\"\n2 5 \"7 rock\"\n$EndPhysicalNames\n\
+        $Nodes\n4\n1 0 0 0\n2 1 0 0\n3 1 1 0\n4 0 1 0\n$EndNodes\n\
+        $Elements\n6\n1 1 2 1 1 1 2\n2 1 2 2 2 2 3\n3 1 2 4 3 3 4\n4 1 2 4 3 2 4\n\
+        5 2 2 5 1 1 2 3\n6 2 2 5 1 1 3 4\n$EndElements\n";
+    let folder = tempfile::tempdir().unwrap();
+    let path = folder.path().join("a.msh");
+    std::fs::write(&path, text).unwrap();
+    let loaded = flat(read_mesh(&path).unwrap()).unwrap();
+    let groups: Vec<_> = (loaded.tags.facet_groups().iter())
+        .map(|group| (group.id, group.name.as_str(), group.facets.clone()))
+        .collect();
+    let expected = [
+        (1, "Inlet_left", vec![[0, 1]]),
+        (2, "Inlet_left.2", vec![[1, 2]]),
+        (4, "group-4", vec![[2, 3]]),
+    ];
+    assert_eq!(groups, expected);
+    // the line across from 2 to 4 is no edge of the mesh
+    assert_eq!(loaded.skipped_cells, 1);
+    let regions = loaded.tags.regions().unwrap();
+    assert_eq!((&regions.of_cells[..], regions.name(5)), (&[5, 5][..], "group-7_rock".to_string()));
+}
+
+/// The golden file of a square of two triangles with its sides; it changes only when the format does.
+#[test]
+fn a_square_is_this_text_in_abaqus() {
+    let square = vec![[0.0, 0.0], [1.0, 0.0], [1.0, 1.0], [0.0, 1.0]];
+    let mesh = Mesh::new(square, vec![0, 1, 2, 0, 2, 3]).unwrap();
+    let sides = Tags::sides(&mesh, &Bounds::of(mesh.points()).unwrap(), 0.0);
+    let folder = tempfile::tempdir().unwrap();
+    let path = folder.path().join("a.inp");
+    let data = MeshData::new(&mesh).with_tags(&sides);
+    write_mesh_as(&path, MeshFormat::Inp, &data, &mut Silent).unwrap();
+    let text = std::fs::read_to_string(&path).unwrap();
+    let expected = "*HEADING\natomesh\n**atomesh {}\n*NODE\n\
+        1, 0.0, 0.0, 0.0\n2, 1.0, 0.0, 0.0\n3, 1.0, 1.0, 0.0\n4, 0.0, 1.0, 0.0\n\
+        *ELEMENT, TYPE=CPS3, ELSET=cells\n1, 1, 2, 3\n2, 1, 3, 4\n\
+        **group 1 xmin\n*NSET, NSET=xmin\n1, 4\n*ELSET, ELSET=xmin_S3, INTERNAL\n2\n\
+        *SURFACE, TYPE=ELEMENT, NAME=xmin\nxmin_S3, S3\n\
+        **group 2 xmax\n*NSET, NSET=xmax\n2, 3\n*ELSET, ELSET=xmax_S2, INTERNAL\n1\n\
+        *SURFACE, TYPE=ELEMENT, NAME=xmax\nxmax_S2, S2\n\
+        **group 3 ymin\n*NSET, NSET=ymin\n1, 2\n*ELSET, ELSET=ymin_S1, INTERNAL\n1\n\
+        *SURFACE, TYPE=ELEMENT, NAME=ymin\nymin_S1, S1\n\
+        **group 4 ymax\n*NSET, NSET=ymax\n3, 4\n*ELSET, ELSET=ymax_S2, INTERNAL\n2\n\
+        *SURFACE, TYPE=ELEMENT, NAME=ymax\nymax_S2, S2\n";
+    assert_eq!(text, expected);
+}
+
+/// Readers take any bytes without a panic.
+fn read_bytes(format: MeshFormat, bytes: &[u8]) {
+    let _ = match format {
+        MeshFormat::Vtu => read_vtu(bytes),
+        MeshFormat::Inp => read_inp(bytes),
+        _ => read_msh(bytes),
+    };
+}
+
+proptest! {
+    #![proptest_config(ProptestConfig { cases: 200, ..ProptestConfig::default() })]
+
+    #[test]
+    fn changed_files_with_tags_are_read_or_refused_without_a_panic(
+        format in 0..FORMATS.len(),
+        changes in prop::collection::vec((any::<prop::sample::Index>(), any::<u8>()), 1..6),
+        cut in any::<prop::sample::Index>(),
+        cuts in any::<bool>(),
+    ) {
+        let mesh = Delaunay::<3>::new().connect(&points(1), &mut Silent).unwrap();
+        let regions = regions(mesh.cell_count(), &[(3, "salt")]);
+        let inner = FacetGroup { id: 9, name: "inner".into(), facets: vec![mesh.facet_of(0, 1)] };
+        let tags = Tags::new(&mesh, vec![inner], Some(regions)).unwrap();
+        let folder = tempfile::tempdir().unwrap();
+        let path = folder.path().join("a");
+        let data = MeshData::new(&mesh).with_tags(&tags);
+        write_mesh_as(&path, FORMATS[format].1, &data, &mut Silent).unwrap();
+        let mut bytes = std::fs::read(&path).unwrap();
+        for (place, byte) in changes {
+            let place = place.index(bytes.len());
+            bytes[place] = byte;
+        }
+        if cuts {
+            bytes.truncate(cut.index(bytes.len()));
+        }
+        read_bytes(FORMATS[format].1, &bytes);
+    }
+}
