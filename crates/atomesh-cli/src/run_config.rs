@@ -71,7 +71,8 @@ section! {
             default_missing_value = "true")]
         pub repel: bool,
         /// Standard deviation in lattice units of a Gaussian over the potential. Default: the
-        /// least step for dark and bright features, none for edges
+        /// least step for dark and bright features, a quarter of the edge length where they repel
+        /// with --mesh voronoi, none for edges
         #[arg(long, value_name = "SIGMA",
             value_parser = number_in(0.0, f64::MAX, "a length of 0 or more"))]
         pub smooth: f64,
@@ -128,7 +129,7 @@ section! {
             value_parser = named::<EngineKind>(&["pairs", "sampled"]))]
         pub engine: EngineKind,
         /// Stages on a smoothed potential before the sharp one. Default: 2 in 2-D,
-        /// 0 in 3-D
+        /// 0 in 3-D and with --mesh voronoi
         #[arg(long, value_name = "COUNT", value_parser = clap::value_parser!(u64).range(0..=MOST_STEPS))]
         pub smoothing_steps: u64,
         /// Relative decrease ε of the energy at which the work ends. Default: 0.001
@@ -305,7 +306,8 @@ impl RunConfig {
     /// The same with every default that does not depend on the image spelt out, so that the run
     /// stays the same when defaults change.
     pub fn with_defaults<const D: usize>(self) -> Self {
-        let (mesh, features) = (MeshOptions::<D>::default(), FeatureOptions::default());
+        let mesh = MeshOptions::<D>::for_kind(self.lattice.mesh.unwrap_or_default());
+        let features = mesh.features.clone();
         let moves = mesh.optimize.clone();
         let mut defaults = Self {
             lattice: LatticeOptions {
@@ -319,7 +321,7 @@ impl RunConfig {
                 features: Some(features.features),
                 edge_operator: Some(features.edge_operator),
                 edge_scale: Some(features.edge_scale),
-                repel: Some(self.is_voronoi() || features.repel),
+                repel: Some(features.repel),
                 smooth: features.smooth,
                 interpolation: Some(mesh.interpolation),
             },
@@ -354,7 +356,7 @@ impl RunConfig {
     /// is out of its range.
     pub fn mesh_options<const D: usize>(&self) -> Result<MeshOptions<D>, Failure> {
         let (lattice, features, moves) = (&self.lattice, &self.features, &self.optimize);
-        let default = MeshOptions::<D>::default();
+        let default = MeshOptions::<D>::for_kind(lattice.mesh.unwrap_or_default());
         let seeds = lattice.seed_point.iter().flatten();
         let count = |n: Option<u64>, default: usize| n.map_or(default, |n| n as usize);
         let optimize = OptimizeOptions {
@@ -381,11 +383,11 @@ impl RunConfig {
                 edge_operator: features.edge_operator.unwrap_or(basis.edge_operator),
                 edge_scale: features.edge_scale.unwrap_or(basis.edge_scale),
                 smooth: features.smooth.or(basis.smooth),
-                repel: features.repel.unwrap_or(self.is_voronoi() || basis.repel),
+                repel: features.repel.unwrap_or(basis.repel),
                 ..basis
             },
             interpolation: features.interpolation.unwrap_or(default.interpolation),
-            kind: lattice.mesh.unwrap_or(default.kind),
+            kind: default.kind,
             units: lattice.units.unwrap_or(default.units),
             size: lattice.size.map_or(Size::Default, |s| s.0),
             image_weight: lattice.beta.unwrap_or(default.image_weight),

@@ -136,7 +136,7 @@ impl Job<'_> {
             watch.say(&format!("warning: {}: {warning}", self.path.display()));
         }
         let Some(outputs) = &self.outputs else {
-            return Ok(expectation(&prepared, dimension));
+            return Ok(expectation(&prepared, dimension, self.run.is_voronoi()));
         };
         let outcome = prepared.run(watch).map_err(|e| self.failure(e))?;
         let figures = self.measure(&outcome, outputs.needs_report(), watch)?;
@@ -432,14 +432,22 @@ fn summary<const D: usize>(
 /// Seconds that an atom takes from growth to mesh, for the dimension; a guide, from our own runs.
 const SECONDS_PER_ATOM: [f64; 2] = [5e-5, 1.2e-5];
 
-fn expectation<const D: usize>(prepared: &Prepared<'_, D>, dimension: &Dimension<D>) -> String {
+fn expectation<const D: usize>(
+    prepared: &Prepared<'_, D>,
+    dimension: &Dimension<D>,
+    is_voronoi: bool,
+) -> String {
     let estimate = prepared.estimate();
+    let (cells, name) = match is_voronoi {
+        true => (estimate.atoms, dimension.voronoi_cells),
+        false => (estimate.cells, dimension.cells),
+    };
     let seconds = estimate.atoms as f64 * SECONDS_PER_ATOM[D - 2];
     format!(
         "atoms  about {}\ncells  about {} {}\nmemory about {} beside the image\ntime   about {:.1} s\n",
         estimate.atoms,
-        estimate.cells,
-        dimension.cells,
+        cells,
+        name,
         memory::text(estimate.memory),
         seconds.max(0.1),
     )

@@ -176,7 +176,8 @@ fn potential_samples<const D: usize>(
     if inputs.is_potential {
         return Ok(enhance::given_potential(inputs.image.samples().clone())?);
     }
-    let features = FeatureOptions { units: options.units, ..options.features };
+    let smooth = options.features.smooth.or_else(|| width_for_faces(inputs, options));
+    let features = FeatureOptions { units: options.units, smooth, ..options.features };
     let image = match (inputs.labels, features.features) {
         (Some(labels), Features::Labels) => labels,
         _ => inputs.image,
@@ -186,6 +187,25 @@ fn potential_samples<const D: usize>(
         warnings.push(Warning::Constant);
     }
     Ok(enhanced.values)
+}
+
+/// How wide a potential that repels is made for Voronoi cells, where no width is asked for: a quarter of the
+/// least d, so that the rows of atoms on both sides feel it (Hale 2002).
+fn width_for_faces<const D: usize>(
+    inputs: &Inputs<'_, D>,
+    options: &MeshOptions<D>,
+) -> Option<f64> {
+    let is_line = matches!(options.features.features, Features::Dark | Features::Bright);
+    if options.kind != MeshKind::Voronoi || !options.features.repel || !is_line {
+        return None;
+    }
+    let grid = inputs.image.frame().grid(options.units);
+    let distance = match options.size {
+        _ if inputs.size_field.is_some() => return None,
+        Size::Default => default_distance(&grid),
+        Size::Constant(d) | Size::Range { min: d, .. } => d,
+    };
+    Some((0.25 * distance).max(grid.least_step()))
 }
 
 fn nominal_distance<const D: usize>(

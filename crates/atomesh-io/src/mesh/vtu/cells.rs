@@ -14,8 +14,9 @@ use super::appended::Head;
 const POLYGON: u8 = 7;
 const POLYHEDRON: u8 = 42;
 
-/// Writes polygons or polyhedra as a VTU file, which ParaView reads; meshio reads it too (of polyhedra the
-/// points of each cell). The cells' fields are `volume` (in 2-D the area) and `site`.
+/// Writes polygons or polyhedra as a VTU file, which ParaView and meshio read, with the arrays `volume` (in 2-D
+/// the area) and `site`, one value a cell. Polygons have them as cell data; polyhedra as field data, since
+/// meshio 5 sorts polyhedra by their number of points, but cell data another way, and then refuses them.
 ///
 /// # Errors
 /// If `out` cannot be written to or does not seek, or the watch ends the work.
@@ -31,14 +32,22 @@ pub fn write_cells_vtu<const D: usize>(
     let mut head = Head::new("UnstructuredGrid");
     head.text("<FieldData>\n");
     head.field_data("UInt8", metadata::NAME, Column::slice(text.as_bytes(), Endian::Little));
-    head.text("</FieldData>\n");
     let (count, cells) = (mesh.points().len(), mesh.cell_count());
-    head.text(&format!("<Piece NumberOfPoints=\"{count}\" NumberOfCells=\"{cells}\">\n"));
-    head.text("<PointData>\n</PointData>\n<CellData>\n");
     let vectors = "NumberOfComponents=\"3\"";
-    head.array("Float64", "volume", "", Column::slice(mesh.measures(), Endian::Little));
-    head.array("Float64", "site", vectors, Column::slice(&sites, Endian::Little));
-    head.text("</CellData>\n<Points>\n");
+    let (volume, site) =
+        (Column::slice(mesh.measures(), Endian::Little), Column::slice(&sites, Endian::Little));
+    let piece = format!("<Piece NumberOfPoints=\"{count}\" NumberOfCells=\"{cells}\">\n");
+    if D == 2 {
+        head.text(&format!("</FieldData>\n{piece}<CellData>\n"));
+        head.array("Float64", "volume", "", volume);
+        head.array("Float64", "site", vectors, site);
+        head.text("</CellData>\n<Points>\n");
+    } else {
+        let tuples = format!("NumberOfTuples=\"{cells}\"");
+        head.array("Float64", "volume", &tuples, volume);
+        head.array("Float64", "site", &format!("{vectors} {tuples}"), site);
+        head.text(&format!("</FieldData>\n{piece}<Points>\n"));
+    }
     head.array("Float64", "Points", vectors, Column::slice(&points, Endian::Little));
     head.text("</Points>\n<Cells>\n");
     head.array("Int64", "connectivity", "", Column::slice(&topology.corners, Endian::Little));
