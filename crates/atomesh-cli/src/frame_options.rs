@@ -106,23 +106,24 @@ impl FrameOptions {
 
     /// The image in the frame of the options, cropped, without NaN.
     pub fn place<const D: usize>(&self, image: Image<D>) -> Result<Image<D>, Failure> {
+        let image = self.place_as_is(image)?;
+        let (nan, all) = (image.samples().range().nan_count, image.samples().len());
+        if nan == 0 {
+            return Ok(image);
+        }
+        let message = format!("{nan} of {all} samples are NaN; expected numbers");
+        Err(Failure::content(message).advise("--fill VALUE puts a number in their place"))
+    }
+
+    /// The image in the frame of the options, cropped; NaN stays unless there is a value for it.
+    pub fn place_as_is<const D: usize>(&self, image: Image<D>) -> Result<Image<D>, Failure> {
         let frame = self.apply(*image.frame())?;
         let mut image = image.with_frame(frame).map_err(Failure::content)?;
         if let Some(Text(crop)) = &self.crop {
             let (start, end) = crop.samples(&frame).map_err(Failure::misuse)?;
             image = image.crop(start, end).map_err(Failure::misuse)?;
         }
-        let range = image.samples().range();
-        if range.nan_count == 0 {
-            return Ok(image);
-        }
-        let Some(fill) = self.fill else {
-            let (nan, all) = (range.nan_count, image.samples().len());
-            let message = format!("{nan} of {all} samples are NaN; expected numbers");
-            return Err(
-                Failure::content(message).advise("--fill VALUE puts a number in their place")
-            );
-        };
+        let Some(fill) = self.fill else { return Ok(image) };
         let (frame, mut samples) = image.into_parts();
         samples.fill_nan(fill);
         Image::new(frame, samples).map_err(Failure::content)

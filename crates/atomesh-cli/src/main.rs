@@ -13,6 +13,7 @@ mod memory;
 mod mesh_file;
 mod outputs;
 mod progress;
+mod report_page;
 mod run_config;
 mod section;
 mod values;
@@ -48,6 +49,7 @@ enum Command {
     Mesh(Box<commands::mesh::MeshArgs>),
     Features(Box<commands::features::FeaturesArgs>),
     Report(Box<commands::report::ReportArgs>),
+    Sample(Box<commands::sample::SampleArgs>),
     Info(Box<commands::info::InfoArgs>),
     Check(commands::check::CheckArgs),
     Synth(commands::synth::SynthArgs),
@@ -70,6 +72,7 @@ impl Cli {
             Command::Mesh(args) => commands::mesh::run(*args, &mut watch),
             Command::Features(args) => commands::features::run(&args, &mut watch),
             Command::Report(args) => commands::report::run(&args, &mut watch),
+            Command::Sample(args) => commands::sample::run(&args, &mut watch),
             Command::Info(args) => commands::info::run(&args, &mut watch),
             Command::Check(args) => commands::check::run(&args),
             Command::Synth(args) => commands::synth::run(&args, &mut watch),

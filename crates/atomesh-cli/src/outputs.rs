@@ -32,6 +32,8 @@ pub struct Outputs {
     picture: Option<(PathBuf, PictureFormat)>,
     /// The report.
     pub report: Option<PathBuf>,
+    /// The report as a page.
+    pub html: Option<PathBuf>,
     potential: Option<PathBuf>,
     /// Whether cells of second order are written.
     is_quadratic: bool,
@@ -135,7 +137,14 @@ impl Outputs {
             ImageFormat::from_path(image),
             Some(ImageFormat::Nifti | ImageFormat::NiftiGz)
         );
-        let report = options.report.clone();
+        let (report, html) = match (options.report.clone(), options.html.clone()) {
+            (Some(report), Some(_)) if is_page(&report) => {
+                let message = "--html names another page; expected one, or a report in JSON";
+                return Err(Failure::misuse(message).about(&report));
+            }
+            (Some(page), None) if is_page(&page) => (None, Some(page)),
+            other => other,
+        };
         let is_quadratic = options.order == Some(2);
         if is_quadratic && !mesh_format.holds_quadratic() {
             let message = "--order 2 is for .vtu .vtk .msh .msh2 .inp files";
@@ -146,12 +155,18 @@ impl Outputs {
             let message = "the format holds no tags; expected .vtu, .msh, .msh2, .inp or polyMesh";
             return Err(Failure::misuse(message).about(&mesh));
         }
+        if let (Some(page), true) = (&html, run.is_voronoi()) {
+            let failure =
+                Failure::misuse("a page shows triangles or tetrahedra, not Voronoi cells");
+            return Err(failure.about(page).advise("ask for --report in JSON, and --picture"));
+        }
         Ok(Self {
             mesh,
             mesh_format,
             connections,
             picture,
             report,
+            html,
             potential,
             is_quadratic,
             tag_features,
@@ -161,17 +176,23 @@ impl Outputs {
 
     /// Whether the image is still needed after the atoms have felt it.
     pub fn needs_image(&self) -> bool {
-        self.picture.is_some()
+        self.picture.is_some() || self.needs_report()
     }
 
-    /// Whether the mesh is to be measured against the features.
+    /// Whether the mesh is to be measured against the features and the image.
     pub fn needs_report(&self) -> bool {
-        self.report.is_some()
+        self.report.is_some() || self.html.is_some()
+    }
+
+    /// How the mesh is drawn.
+    pub fn style<const D: usize>(&self, outcome: &Outcome<D>) -> Style {
+        let z_up = self.z_is_height && outcome.frame().direction()[D - 1][D - 1] > 0.0;
+        Style { units: outcome.units(), z_up, ..Style::default() }
     }
 
     fn paths(&self) -> impl Iterator<Item = &Path> {
         let picture = self.picture.as_ref().map(|(path, _)| path);
-        let others = [picture, self.report.as_ref(), self.potential.as_ref()];
+        let others = [picture, self.report.as_ref(), self.html.as_ref(), self.potential.as_ref()];
         let others = others.into_iter().flatten().map(PathBuf::as_path);
         let tables = self.connections.iter().flat_map(ConnectionFiles::paths);
         [self.mesh.as_path()].into_iter().chain(others).chain(tables)
@@ -223,8 +244,7 @@ impl Outputs {
     ) -> Result<(), Failure> {
         if let (Some((path, format)), Some(image)) = (&self.picture, image) {
             watch.begin(Phase::Draw);
-            let z_up = self.z_is_height && outcome.frame().direction()[D - 1][D - 1] > 0.0;
-            let style = Style { units: outcome.units(), z_up, ..Style::default() };
+            let style = self.style(outcome);
             let picture = match outcome.sample_cells() {
                 Some(cells) => (dimension.draw_cells)(image, &cells, &style),
                 None => (dimension.draw)(image, &outcome.sample_mesh(), &style),
@@ -336,6 +356,11 @@ fn msh_version(text: &str) -> Result<MshVersion, Failure> {
         "2.2" => Ok(MshVersion::V22),
         _ => Err(Failure::misuse(format!("msh version {text:?}; expected 4.1 or 2.2"))),
     }
+}
+
+/// Whether a report is to be a page.
+fn is_page(path: &Path) -> bool {
+    path.extension().is_some_and(|e| e.eq_ignore_ascii_case("html"))
 }
 
 fn unknown_ending(path: &Path, known: &str) -> Failure {

@@ -206,9 +206,13 @@ section! {
         /// middle
         #[arg(long, value_name = "PICTURE")]
         pub picture: PathBuf,
-        /// Figures of the mesh (shape, alignment) and of the run, as JSON
+        /// Figures of the mesh (shape, alignment, fidelity) and of the run, as JSON; as a page if it ends
+        /// in .html
         #[arg(long, value_name = "JSON")]
         pub report: PathBuf,
+        /// The same figures with a picture and histograms, as one HTML page that needs no other file
+        #[arg(long, value_name = "HTML")]
+        pub html: PathBuf,
         /// Potential that the atoms felt: .npy (axes z, y, x), .nii, .nii.gz, .tif or .raw, float32
         #[arg(long, value_name = "FILE")]
         pub write_potential: PathBuf,

@@ -3,8 +3,8 @@
 //! [`draw_flat`] lays a triangular mesh over its image, as in figure 2 of Hale (2001), or atoms over a
 //! field, as in his figure 5; [`draw_slices`] lays the cuts of a tetrahedral mesh over the three
 //! orthogonal slices of its image, as in his figure 9; [`draw_polygons`] and [`draw_polyhedra`] do the same for
-//! Voronoi cells. All return a [`Picture`], a list of what to
-//! draw and where, which becomes PNG or SVG; the same input gives the same bytes.
+//! Voronoi cells. All return a [`Picture`], a list of what to draw and where, which becomes PNG or SVG;
+//! [`ReportPage`] is a report with its pictures as one HTML file. The same input gives the same bytes.
 //!
 //! Meshes are given in *sample coordinates*: lattice coordinates divided by the grid's step. Row 0 is
 //! on top, x grows to the right. A sample covers the square around its centre, so a picture reaches
@@ -13,6 +13,7 @@
 mod error;
 mod flat;
 mod label;
+mod page;
 mod picture;
 mod png_encode;
 mod raster;
@@ -23,6 +24,7 @@ mod view;
 
 pub use error::DrawError;
 pub use flat::{draw_flat, draw_polygons};
+pub use page::ReportPage;
 pub use picture::{Picture, PictureFormat};
 pub use slices::{draw_polyhedra, draw_slices};
 pub use style::{Color, Style};

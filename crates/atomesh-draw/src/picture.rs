@@ -88,6 +88,16 @@ impl Picture {
         self.height
     }
 
+    /// How many lines, dots and the like there are: what decides how large it is as SVG.
+    pub(crate) fn shape_count(&self) -> usize {
+        let count = |shape: &Shape| match shape {
+            Shape::Image { .. } | Shape::Fill { .. } => 1,
+            Shape::Lines { lines, .. } => lines.len(),
+            Shape::Discs { centers, .. } | Shape::Squares { centers, .. } => centers.len(),
+        };
+        self.shapes.iter().map(count).sum()
+    }
+
     /// The bytes of a file of that kind; the same for the same picture.
     ///
     /// # Errors

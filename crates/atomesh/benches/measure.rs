@@ -1,8 +1,10 @@
-//! Measures, in cells and samples per second: shape of cells, features, alignment.
+//! Measures, in cells and samples per second: shape of cells, features, alignment, fidelity, samples in cells.
 
 use atomesh::geometry::Point;
-use atomesh::measure::{AlignmentOptions, alignment, features, shape, shapes};
+use atomesh::image::{Frame, Samples};
+use atomesh::measure::{AlignmentOptions, alignment, features, fidelity, shape, shapes};
 use atomesh::mesh::Mesh;
+use atomesh::sample::{SampleOptions, Statistic, sample_placed};
 use atomesh::watch::Silent;
 use criterion::{Criterion, Throughput, criterion_group, criterion_main};
 
@@ -60,6 +62,16 @@ fn measures(criterion: &mut Criterion) {
     let options = AlignmentOptions::new(STEP);
     group.bench_function("alignment", |b| {
         b.iter(|| alignment(&mesh, &found, &options, &mut Silent));
+    });
+
+    let Ok(frame) = Frame::new([side; 3]) else { return };
+    let image = Samples::F32(potential);
+    group.bench_function("sample", |b| {
+        let options = SampleOptions::new(&[Statistic::Mean, Statistic::Total]);
+        b.iter(|| sample_placed(&mesh, (&frame, &image), options, &mut Silent));
+    });
+    group.bench_function("fidelity", |b| {
+        b.iter(|| fidelity(&mesh, (&frame, &image), &mut Silent));
     });
     group.finish();
 }

@@ -147,6 +147,13 @@ fn mesh_text<const D: usize>(
         let value = format!("{}, {least} to {greatest}", field.name);
         line(&mut text, "field", value);
     }
+    for field in &loaded.cell_fields {
+        let finite = || field.values.iter().copied().filter(|v| v.is_finite());
+        let (least, greatest) =
+            (finite().fold(f64::INFINITY, f64::min), finite().fold(f64::NEG_INFINITY, f64::max));
+        let value = format!("{}, {least} to {greatest}", field.name);
+        line(&mut text, "cell field", value);
+    }
     let groups = loaded.tags.facet_groups();
     if !groups.is_empty() {
         let named = groups.iter().map(|group| format!("{} {}", group.name, group.facets.len()));

@@ -24,6 +24,7 @@ use crate::frame_options;
 use crate::memory;
 use crate::outputs::{Outputs, write_bytes};
 use crate::progress::{Progress, Verbosity, writing};
+use crate::report_page::{PageParts, option_rows, write_page};
 use crate::run_config::RunConfig;
 
 /// Turn an image into a mesh that follows it
@@ -139,7 +140,8 @@ impl Job<'_> {
             return Ok(expectation(&prepared, dimension, self.run.is_voronoi()));
         };
         let outcome = prepared.run(watch).map_err(|e| self.failure(e))?;
-        let figures = self.measure(&outcome, outputs.needs_report(), watch)?;
+        let measured = image.as_ref().filter(|_| outputs.needs_report());
+        let figures = self.measure(&outcome, measured, watch)?;
         let _guard = writing();
         let options = self.run.provenance::<D>();
         outputs.write(&outcome, image.as_ref(), options, dimension, watch)?;
@@ -150,6 +152,9 @@ impl Job<'_> {
         if let Some(path) = &outputs.report {
             let text = format!("{:#}\n", self.report(&outcome, &figures, watch));
             write_bytes(path, text.as_bytes())?;
+        }
+        if let (Some(path), Some(image)) = (&outputs.html, &image) {
+            self.write_page(path, (&outcome, image), &figures, dimension, watch)?;
         }
         if let Some(report) = &figures.cells {
             watch.say(&cells_summary(&outputs.mesh, report, dimension, watch));
@@ -237,19 +242,22 @@ impl Job<'_> {
     fn measure<const D: usize>(
         &self,
         outcome: &Outcome<D>,
-        alignment: bool,
+        image: Option<&Image<D>>,
         watch: &mut Progress,
     ) -> Result<Figures, Failure> {
-        if outcome.cells().is_some() && (alignment || watch.verbosity() != Verbosity::Quiet) {
+        let is_quiet = watch.verbosity() == Verbosity::Quiet;
+        if outcome.cells().is_some() && (image.is_some() || !is_quiet) {
             let cells = outcome.cells_report(watch).map_err(|e| self.failure(e))?;
             return Ok(Figures { cells, ..Figures::default() });
         }
-        if alignment {
-            let report = outcome.report(watch).map_err(|e| self.failure(e))?;
+        if let Some(image) = image {
+            let mut report = outcome.report(watch).map_err(|e| self.failure(e))?;
+            let fidelity = outcome.fidelity(image.samples(), watch);
+            report.fidelity = Some(fidelity.map_err(|e| self.failure(e))?);
             let shape = Some(report.shape.clone());
             return Ok(Figures { shape, report: Some(report), cells: None });
         }
-        if watch.verbosity() == Verbosity::Quiet {
+        if is_quiet {
             return Ok(Figures::default());
         }
         let shape = shape(outcome.mesh(), outcome.bounds().as_ref(), watch);
@@ -284,6 +292,8 @@ impl Job<'_> {
             },
             "shape": figures.shape_json(),
             "alignment": figures.alignment_json(),
+            "spread": figures.report.as_ref().map(|r| &r.spread),
+            "fidelity": figures.report.as_ref().map(|r| &r.fidelity),
             "optimizer": outcome.optimize_report(),
             "improve": outcome.improve_report(),
             "seconds": seconds,
@@ -293,6 +303,46 @@ impl Job<'_> {
             "warnings": warnings,
             "options": self.run.clone().with_defaults::<D>(),
         })
+    }
+
+    /// The report as a page, with the mesh drawn over its image.
+    fn write_page<const D: usize>(
+        &self,
+        path: &Path,
+        (outcome, image): (&Outcome<D>, &Image<D>),
+        figures: &Figures,
+        dimension: &Dimension<D>,
+        watch: &Progress,
+    ) -> Result<(), Failure> {
+        let (Some(report), Some(outputs)) = (&figures.report, &self.outputs) else {
+            return Ok(());
+        };
+        let time = |seconds: f64| format!("{seconds:.3} s");
+        let times = watch.times().iter();
+        let mut run: Vec<_> =
+            times.map(|(phase, t)| (phase.name().to_owned(), time(t.as_secs_f64()))).collect();
+        run.push(("in all".into(), time(watch.elapsed().as_secs_f64())));
+        if let Some(bytes) = memory::peak() {
+            run.push(("memory, at most".into(), memory::text(bytes)));
+        }
+        let options = serde_json::to_value(self.run.clone().with_defaults::<D>());
+        let shape = outcome.frame().shape().map(|n| n.to_string()).join(" × ");
+        let parts = PageParts {
+            mesh: &outputs.mesh,
+            subtitle: format!(
+                "{} over an image of {shape} samples; atomesh {}",
+                dimension.cells,
+                env!("CARGO_PKG_VERSION")
+            ),
+            caption: caption::<D>(self.path),
+            tables: vec![
+                ("Options".into(), option_rows(&options.unwrap_or_default())),
+                ("Run".into(), run),
+            ],
+            warnings: outcome.warnings().iter().map(ToString::to_string).collect(),
+        };
+        let (mesh, style) = (outcome.sample_mesh(), outputs.style(outcome));
+        write_page(path, parts, report, (image, &mesh, &style), dimension)
     }
 
     /// What the core refuses, in the user's terms.
@@ -404,6 +454,15 @@ fn cells_summary<const D: usize>(
         shape.volume_error,
         watch.elapsed().as_secs_f64(),
     )
+}
+
+/// What the picture of a mesh over its image shows.
+pub fn caption<const D: usize>(image: &Path) -> String {
+    let name = image.file_name().unwrap_or(image.as_os_str()).to_string_lossy();
+    match D {
+        2 => format!("The mesh over {name}"),
+        _ => format!("The mesh over {name}, on the three slices through its middle"),
+    }
 }
 
 fn summary<const D: usize>(

@@ -7,6 +7,7 @@ pub mod info;
 pub mod man;
 pub mod mesh;
 pub mod report;
+pub mod sample;
 pub mod synth;
 
 use atomesh::measure::MeasureError;

@@ -301,27 +301,52 @@ fn each_sample<const D: usize>(
         let high = (max + SLACK).floor().min(last) as usize;
         counts[k] = (high + 1).saturating_sub(low[k]);
     }
-    let mut shares = [0.0; 5]; // D + 1 of them, D at most 4
-    for code in 0..counts.iter().product() {
-        let (mut rest, mut index, mut stride, mut weight) = (code, 0, 1, 1.0);
-        let mut offset = [0.0; D];
-        for k in 0..D {
+    if counts[0] == 0 {
+        return;
+    }
+    // column k of the inverse is the gradient of the barycentric coordinate of corner k + 1
+    let mut gradients = [[0.0; D]; 5]; // D + 1 of them, D at most 4
+    for k in 0..D {
+        for r in 0..D {
+            gradients[k + 1][r] = inverse[r][k];
+            gradients[0][r] -= inverse[r][k];
+        }
+    }
+    for row in 0..counts[1..].iter().product() {
+        let (mut rest, mut index, mut stride, mut weight) = (row, low[0], shape[0], 1.0);
+        let mut offset = [low[0] as f64 - first[0]; D];
+        for k in 1..D {
             let at = low[k] + rest % counts[k];
             rest /= counts[k];
             index += at * stride;
             stride *= shape[k];
-            weight *= if at == 0 || at + 1 == shape[k] { 0.5 } else { 1.0 };
+            weight *= rim(at, shape[k]);
             offset[k] = at as f64 - first[k];
         }
-        let mut left = 1.0;
-        for k in 0..D {
-            // column k of the inverse is the gradient of the barycentric coordinate of corner k + 1
-            shares[k + 1] = (0..D).map(|r| offset[r] * inverse[r][k]).sum();
-            left -= shares[k + 1];
+        // the coordinates at the row's first sample, and from where to where none is below 0
+        let mut starts = [0.0; 5];
+        let (mut from, mut to) = (0.0_f64, (counts[0] - 1) as f64);
+        for k in 0..=D {
+            starts[k] = f64::from(u8::from(k == 0)) + crate::geometry::dot(&offset, &gradients[k]);
+            let (start, slope) = (starts[k] + SLACK, gradients[k][0]);
+            match slope {
+                s if s > 0.0 => from = from.max((-start / s).ceil()),
+                s if s < 0.0 => to = to.min((-start / s).floor()),
+                _ if start < 0.0 => to = -1.0,
+                _ => {}
+            }
         }
-        shares[0] = left;
-        if shares[..=D].iter().all(|&share| share >= -SLACK) {
-            visit(index, &shares[..=D], weight);
+        if from > to {
+            continue;
+        }
+        for i in from as usize..=to as usize {
+            let shares: [f64; 5] = std::array::from_fn(|k| starts[k] + i as f64 * gradients[k][0]);
+            visit(index + i, &shares[..=D], weight * rim(low[0] + i, shape[0]));
         }
     }
+}
+
+/// Which part of a box one wide lies in an image, along an axis.
+fn rim(at: usize, count: usize) -> f64 {
+    if at == 0 || at + 1 == count { 0.5 } else { 1.0 }
 }

@@ -71,11 +71,12 @@ impl Overlaps {
         }
     }
 
-    /// Calls `visit` with the first sample (by its index along each axis) of each row of boxes within the
-    /// cell's bounds and the overlap of each box in the row, negative for facets that look inward. The sums
-    /// that make them leave roundings in boxes outside the cell.
+    /// Calls `visit` with the first sample (by its index along each axis) of each row of boxes that the cell
+    /// reaches and the overlaps of the boxes from there to the last that it reaches, negative for facets that
+    /// look inward. The sums that make them may leave roundings in boxes that the cell just misses.
     pub fn each_row(&mut self, surface: &Surface, mut visit: impl FnMut([usize; 3], &[f64])) {
         let Some((first, last)) = self.reach(surface) else { return };
+        self.rows.cut = surface.corners.iter().any(|p| p[0] < 0.0);
         self.rests.resize_with(surface.ends.len(), Vec::new);
         for (rest, facet) in self.rests.iter_mut().zip(surface.facets()) {
             rest.clear();
@@ -101,7 +102,7 @@ impl Overlaps {
                 }
                 self.cut_slab();
             }
-            self.rows.each(&self.axes[0], |y, overlaps| visit([first[0], y, z], overlaps));
+            self.rows.each(&self.axes[0], |x, y, overlaps| visit([x, y, z], overlaps));
         }
     }
 
@@ -138,6 +139,10 @@ impl Overlaps {
 struct Rows {
     first: [usize; 2],
     shape: [usize; 2],
+    /// Whether the cell goes on before box 0 of rows: then rows fill from there.
+    cut: bool,
+    /// The first and the last boxes of each row that pieces are in.
+    reached: Vec<[usize; 2]>,
     /// The part of its own box that lies between a piece and the lower side, for each box.
     own: Vec<f64>,
     /// The shadows of the pieces in each box, and one after the last box for all beyond.
@@ -154,30 +159,43 @@ impl Rows {
             values.clear();
             values.resize(count, 0.0);
         }
+        self.reached.clear();
+        self.reached.resize(self.shape[1], [usize::MAX, 0]);
     }
 
     /// Adds a piece of facet in box `x` of row `y`.
     #[inline]
     fn add(&mut self, axis: &Axis, [x, y]: [usize; 2], piece: &[Point<3>]) {
         let (area, moment) = shadow(piece);
-        let at = (y - self.first[1]) * (self.shape[0] + 1) + x - self.first[0];
+        let (column, row) = (x - self.first[0], y - self.first[1]);
+        let [low, high] = &mut self.reached[row];
+        (*low, *high) = ((*low).min(column), (*high).max(column));
+        let at = row * (self.shape[0] + 1) + column;
         self.shadows[at] += area;
         if x < axis.count {
             self.own[at] += moment - area * axis.side(x);
         }
     }
 
-    fn each(&mut self, axis: &Axis, mut visit: impl FnMut(usize, &[f64])) {
+    /// Calls `visit` with the first box, the row and the overlaps of each row.
+    fn each(&mut self, axis: &Axis, mut visit: impl FnMut(usize, usize, &[f64])) {
         let count = self.shape[0];
         self.overlaps.resize(count, 0.0);
         for row in 0..self.shape[1] {
+            let [low, high] = self.reached[row];
+            if low == usize::MAX {
+                continue;
+            }
+            let (low, high) = (if self.cut { 0 } else { low }, high.min(count - 1));
             let at = row * (count + 1);
             let mut filled = self.shadows[at + count];
-            for x in (0..count).rev() {
+            for x in (low..=high).rev() {
                 self.overlaps[x] = self.own[at + x] + filled * axis.width(self.first[0] + x);
                 filled += self.shadows[at + x];
             }
-            visit(self.first[1] + row, &self.overlaps);
+            if low <= high {
+                visit(self.first[0] + low, self.first[1] + row, &self.overlaps[low..=high]);
+            }
         }
     }
 }
