@@ -20,7 +20,7 @@ pub(super) struct Chart<'a> {
 
 /// The drawing's size, and the room around its bars: left, right, above, below.
 const SIZE: [f64; 2] = [380.0, 190.0];
-const ROOM: [f64; 4] = [8.0, 12.0, 34.0, 34.0];
+const ROOM: [f64; 4] = [8.0, 18.0, 34.0, 34.0];
 
 /// Bars kept beyond the first and the last that hold anything.
 const BESIDE: usize = 1;
