@@ -12,9 +12,7 @@ use super::valley::{Contrast, LEAST_DEPTH, System, Valley, worth};
 use crate::geometry::{Point, distance_squared};
 
 /// What a cell's shape weighs against a facet's depth.
-pub(super) fn stiffness() -> f64 {
-    std::env::var("STIFF").ok().and_then(|s| s.parse().ok()).unwrap_or(0.15)
-}
+pub(super) const STIFFNESS: f64 = 0.08;
 /// What a swap must gain, so that none goes in circles.
 const GAIN: f64 = 1e-3;
 /// What a move must gain, and the share of the edges' length that it must go.
@@ -30,27 +28,20 @@ const DEEPER: f64 = 0.05;
 /// Where on an edge valleys are looked for.
 const SHARES: [f64; 5] = [0.17, 0.33, 0.5, 0.67, 0.83];
 /// A point this deep, between the least and the greatest depth around, may be a corner of a facet in the valley.
-fn near() -> f64 {
-    static N: std::sync::LazyLock<f64> = std::sync::LazyLock::new(|| {
-        std::env::var("NEAR").ok().and_then(|s| s.parse().ok()).unwrap_or(0.2)
-    });
-    *N
-}
+const NEAR: f64 = 0.2;
 
-fn own() -> f64 {
-    static N: std::sync::LazyLock<f64> = std::sync::LazyLock::new(|| {
-        std::env::var("OWN").ok().and_then(|s| s.parse().ok()).unwrap_or(1.0)
-    });
-    *N
-}
+/// What the depth at a point itself weighs against that of its facets.
+const OWN: f64 = 1.0;
+/// Facets of a lesser mean depth, between the least and the greatest, are left out of account.
+const DEEP: f64 = 0.45;
+
 /// What alignment works with.
 pub(super) struct Aligner<'a> {
-    pub valley: &'a Valley<'a>,
+    valley: &'a Valley<'a>,
     /// The greatest cosine that swaps and moves may leave.
-    pub floor: f64,
-    pub stiffness: f64,
+    floor: f64,
     /// The depth at each point of the patch.
-    pub depths: Vec<f64>,
+    depths: Vec<f64>,
 }
 
 /// By what facets are measured in one place: over the square of a length, between two depths.
@@ -60,7 +51,11 @@ struct Scale {
     contrast: Contrast,
 }
 
-impl Aligner<'_> {
+impl<'a> Aligner<'a> {
+    pub fn new(valley: &'a Valley<'a>, floor: f64, patch: &Patch) -> Self {
+        Self { valley, floor, depths: patch.points.iter().map(|p| valley.depth(p)).collect() }
+    }
+
     fn facet(&self, patch: &Patch, corners: [u32; 3], scale: &Scale) -> f64 {
         let facet = corners.map(|c| patch.points[c as usize]);
         scale.area * self.valley.worth(&facet, &scale.contrast)
@@ -69,24 +64,20 @@ impl Aligner<'_> {
     /// What a cell costs; more than anything gains if it is below the floor.
     fn cost(&self, patch: &Patch, corners: &[u32; 4]) -> f64 {
         let shape = patch.shape_of(corners);
-        if shape.cosine > self.floor {
-            f64::INFINITY
-        } else {
-            self.stiffness * (1.0 - shape.quality)
-        }
+        if shape.cosine > self.floor { f64::INFINITY } else { STIFFNESS * (1.0 - shape.quality) }
     }
 
     /// What a cell that is there costs; one below the floor is not held against those that replace it.
     fn cost_now(&self, patch: &Patch, cell: u32) -> f64 {
-        self.stiffness * (1.0 - patch.shapes[cell as usize].quality)
+        STIFFNESS * (1.0 - patch.shapes[cell as usize].quality)
     }
 
     /// Takes out edges that a valley crosses between their ends, and puts edges that lie in one through facets.
-    pub fn swap(&self, patch: &mut Patch, open: &[bool], effort: &mut Effort) {
+    pub fn swap(&mut self, patch: &mut Patch, open: &[bool], effort: &mut Effort) {
         for (cell, a, b, depth) in self.crossed_edges(patch, open) {
             if let Some(cell) = patch.cell_with(cell, a, b) {
-                let (i, j) = (patch.place(cell, a), patch.place(cell, b));
-                effort.swaps += usize::from(self.swap_edge(patch, cell, [i, j], depth));
+                let ends = [patch.place(cell, a), patch.place(cell, b)];
+                effort.swaps += usize::from(self.swap_edge(patch, cell, ends, depth));
             }
         }
         for cell in 0..patch.slot_count() {
@@ -101,14 +92,12 @@ impl Aligner<'_> {
     /// The edges that a valley crosses between their ends, each with a cell that has it and the depth there.
     fn crossed_edges(&self, patch: &mut Patch, open: &[bool]) -> Vec<(u32, u32, u32, f64)> {
         let mut edges = Vec::new();
-        patch.each_edge(|patch, cell, a, b| {
-            if open[a as usize] || open[b as usize] {
-                let ends = self.depths[a as usize].max(self.depths[b as usize]);
-                let depth = SHARES.map(|share| self.on_way(patch, a, b, share)).into_iter();
-                let depth = depth.fold(0.0, f64::max);
-                if depth > (ends + DEEPER).max(LEAST_DEPTH) {
-                    edges.push((cell, a, b, depth));
-                }
+        patch.each_edge(open, |patch, cell, a, b| {
+            let ends = self.depths[a as usize].max(self.depths[b as usize]);
+            let depth = SHARES.map(|share| self.on_way(patch, a, b, share)).into_iter();
+            let depth = depth.fold(0.0, f64::max);
+            if depth > (ends + DEEPER).max(LEAST_DEPTH) {
+                edges.push((cell, a, b, depth));
             }
         });
         edges
@@ -145,7 +134,7 @@ impl Aligner<'_> {
         let around = ring.points[..ring.count].iter().chain(&ring.ends);
         around.for_each(|&p| contrast.include(self.depths[p as usize]));
         contrast.include(depth);
-        let is_near = |p: &&u32| contrast.of(self.depths[**p as usize]) > near();
+        let is_near = |p: &&u32| contrast.of(self.depths[**p as usize]) > NEAR;
         if ring.points[..ring.count].iter().filter(is_near).count() < 3 {
             return false;
         }
@@ -220,7 +209,7 @@ impl Aligner<'_> {
         if contrast.high < LEAST_DEPTH {
             return false;
         }
-        let is_near = |point: u32| contrast.of(self.depths[point as usize]) > near();
+        let is_near = |point: u32| contrast.of(self.depths[point as usize]) > NEAR;
         room.find_rims(patch, point, is_near);
         if room.rims.len() < 2 {
             return false;
@@ -230,12 +219,13 @@ impl Aligner<'_> {
             let mean = self.valley.mean_of(&[at, rim[0], rim[1]], &mut contrast);
             room.means.push(mean);
         }
+        room.keep_deep(&contrast);
         let freedom = patch.freedom[point as usize];
         let size = room.size_squared(&at);
         let mut system = System::default();
         let scale = Scale { area: 1.0 / size, contrast };
         let (mut now, mut worst) =
-            (own() * contrast.of(self.depths[point as usize]).powi(2), -1.0_f64);
+            (OWN * contrast.of(self.depths[point as usize]).powi(2), -1.0_f64);
         for (rim, mean) in room.rims.iter().zip(&room.means) {
             let facet = [at, rim[0], rim[1]];
             self.valley.pull(&facet, *mean, &contrast, &mut system);
@@ -253,14 +243,12 @@ impl Aligner<'_> {
             (0..3).filter(|k| freedom >> k & 1 == 0).for_each(|k| shift[k] = 0.0);
             Some((shift, [1.0, 0.6]))
         };
-        for n in 0..(if std::env::var("NOFALL").is_ok() { 1 } else { 2 }) {
+        for n in 0..2 {
             let Some((shift, shares)) = (if n == 0 { fitted } else { fallen() }) else { continue };
             if shift.iter().map(|x| x * x).sum::<f64>() < LEAST_MOVE * LEAST_MOVE * size {
                 continue;
             }
-            let is_fine = n == 0
-                && std::env::var("NOFINE").is_err()
-                && shift.iter().map(|x| x * x).sum::<f64>() < FINE * FINE * size;
+            let is_fine = n == 0 && shift.iter().map(|x| x * x).sum::<f64>() < FINE * FINE * size;
             for share in shares {
                 let to = std::array::from_fn(|k| at[k] + share * shift[k]);
                 let Some(cost) = self.cost_at(room, &to, limit) else { continue };
@@ -287,7 +275,7 @@ impl Aligner<'_> {
             if shape.cosine > limit {
                 return None;
             }
-            sum += self.stiffness * (1.0 - shape.quality);
+            sum += STIFFNESS * (1.0 - shape.quality);
         }
         Some(sum)
     }
@@ -298,7 +286,7 @@ impl Aligner<'_> {
             let facet = [*at, rim[0], rim[1]];
             scale.area * self.valley.worth(&facet, &scale.contrast)
         });
-        own() * scale.contrast.of(self.valley.depth(at)).powi(2) + facets.sum::<f64>()
+        OWN * scale.contrast.of(self.valley.depth(at)).powi(2) + facets.sum::<f64>()
     }
 }
 
@@ -348,6 +336,19 @@ impl Room {
                 }
             }
         }
+    }
+
+    /// Forgets facets that are worth next to nothing.
+    fn keep_deep(&mut self, contrast: &Contrast) {
+        let mut kept = 0;
+        for n in 0..self.rims.len() {
+            if contrast.of(self.means[n]) > DEEP {
+                (self.rims[kept], self.means[kept]) = (self.rims[n], self.means[n]);
+                kept += 1;
+            }
+        }
+        self.rims.truncate(kept);
+        self.means.truncate(kept);
     }
 
     /// The mean square of the distances to the far points.

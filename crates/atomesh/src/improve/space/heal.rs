@@ -63,7 +63,7 @@ enum Swap {
 }
 
 /// Makes the swap that leaves the least cosine, if it is less than before.
-fn swap_away(patch: &mut Patch, cell: u32) -> bool {
+pub(super) fn swap_away(patch: &mut Patch, cell: u32) -> bool {
     let worst = patch.shapes[cell as usize].cosine;
     let (mut best, mut least) = (None, -worst + GAIN);
     for i in 0..3 {

@@ -151,4 +151,4 @@ impl Whole {
 }
 
 /// How many edges from held points the next pass looks.
-const LAYERS: usize = 2;
+const LAYERS: usize = 1;

@@ -155,16 +155,20 @@ impl Patch {
         star.into_iter().find(|&cell| has(&self.corners[cell as usize]))
     }
 
-    /// Calls `visit` once for every edge with a cell that has it, lesser point first.
-    pub fn each_edge(&mut self, mut visit: impl FnMut(&Self, u32, u32, u32)) {
+    /// Calls `visit` once for every edge of an open point, with a cell that has it.
+    pub fn each_edge(&mut self, open: &[bool], mut visit: impl FnMut(&Self, u32, u32, u32)) {
         let mut last = vec![NONE; self.points.len()];
         let mut star = Vec::with_capacity(40);
         for point in 0..self.points.len() as u32 {
+            if !open[point as usize] {
+                continue;
+            }
             star.clear();
             self.star(point, &mut star);
             for &cell in &star {
                 for other in self.corners[cell as usize] {
-                    if other > point && last[other as usize] != point {
+                    let is_first = other > point || !open[other as usize];
+                    if is_first && other != point && last[other as usize] != point {
                         last[other as usize] = point;
                         visit(self, cell, point, other);
                     }

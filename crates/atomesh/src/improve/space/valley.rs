@@ -7,7 +7,9 @@ use crate::potential::ImagePotential;
 /// b between samples, linear along each axis whatever the atoms felt: only its value is wanted, often.
 pub(super) struct Valley<'a> {
     samples: &'a [f32],
-    shape: [usize; 3],
+    /// The last sample but one along each axis, and the way to the next in memory, 0 if there is only one.
+    last: [usize; 3],
+    next: [usize; 3],
     scale: [f64; 3],
     strides: [usize; 3],
     /// The least step of the samples.
@@ -31,11 +33,13 @@ impl<'a> Valley<'a> {
     pub fn new(potential: &'a ImagePotential<3>) -> Self {
         let grid = potential.grid();
         let shape = grid.shape;
+        let strides = [1, shape[0], shape[0] * shape[1]];
         Self {
             samples: potential.samples(),
-            shape,
+            last: shape.map(|n| n.saturating_sub(2)),
+            next: std::array::from_fn(|k| if shape[k] > 1 { strides[k] } else { 0 }),
             scale: grid.step.map(|step| 1.0 / step),
-            strides: [1, shape[0], shape[0] * shape[1]],
+            strides,
             step: grid.least_step(),
         }
     }
@@ -45,14 +49,13 @@ impl<'a> Valley<'a> {
     pub fn depth(&self, p: &Point<3>) -> f64 {
         let mut base = 0;
         let mut t = [0.0_f32; 3];
-        let mut next = [0; 3];
         for k in 0..3 {
             let s = p[k] * self.scale[k];
-            let i = (s as usize).min(self.shape[k].saturating_sub(2));
+            let i = (s as u32 as usize).min(self.last[k]);
             t[k] = ((s - i as f64) as f32).clamp(0.0, 1.0);
             base += i * self.strides[k];
-            next[k] = if self.shape[k] > 1 { self.strides[k] } else { 0 };
         }
+        let next = &self.next;
         let row = |at: usize| {
             let (a, b) = (self.samples[at], self.samples[at + next[0]]);
             a + t[0] * (b - a)
@@ -96,15 +99,19 @@ impl<'a> Valley<'a> {
             return;
         }
         let normal = normal.map(|x| x / length);
-        let bottoms = PLACES.map(|w| self.bottom(&between(facet, &w), &normal, contrast));
-        if bottoms.iter().any(|bottom| bottom.variance == 0.0) {
-            return; // the valley runs through the facet, not along it
-        }
         let mut spread = 0.0;
-        for (w, bottom) in PLACES.iter().zip(&bottoms) {
+        let mut wishes = [(0.0, 0.0, 0.0); PLACES.len()];
+        for (wish, w) in wishes.iter_mut().zip(&PLACES) {
+            let bottom = self.bottom(&between(facet, w), &normal, contrast);
+            if bottom.variance == 0.0 {
+                return; // the valley runs through the facet, not along it
+            }
             let weight = 0.5 * length * mean * mean * contrast.of(bottom.depth);
-            system.add(&normal, w[0], bottom.offset, weight);
             spread += weight * bottom.variance;
+            *wish = (w[0], bottom.offset, weight);
+        }
+        for (share, offset, weight) in wishes {
+            system.add(&normal, share, offset, weight);
         }
         // the area's gradient is half the far edge turned by a right angle; ∂A weighs as A does
         let growth = cross(&difference(&facet[2], &facet[1]), &normal);
@@ -194,9 +201,6 @@ pub(super) fn worth(facet: &[Point<3>; 3], mean: f64, contrast: &Contrast) -> f6
 /// Facets of a lesser mean, between the least and the greatest depth around, are not drawn to a valley.
 const LEAST_MEAN: f64 = 0.3;
 
-/// Facets of a greater mean lie in a valley.
-const WITHIN: f64 = 0.7;
-
 /// Where no place is deeper there is no feature.
 pub(super) const LEAST_DEPTH: f64 = 0.2;
 
@@ -234,15 +238,6 @@ pub(super) struct System {
 }
 
 impl System {
-    pub fn debug(&self) -> f64 {
-        let q = dot(&self.normal, &self.normal);
-        if q > 0.9 * self.count * self.count {
-            dot(&self.growth, &self.normal) / q.sqrt() / self.weight
-        } else {
-            -q / (self.count * self.count)
-        }
-    }
-
     /// Adds the wish that `share` of the move, along a unit vector, be `offset`.
     #[inline]
     fn add(&mut self, along: &Point<3>, share: f64, offset: f64, weight: f64) {
@@ -275,10 +270,7 @@ impl System {
         let mut right = self.right;
         let square = dot(&self.normal, &self.normal);
         let lift = dot(&self.growth, &self.normal) / square;
-        if square > 0.9 * self.count * self.count
-            && lift.is_finite()
-            && std::env::var("NOLIFT").is_err()
-        {
+        if square > 0.9 * self.count * self.count && lift.is_finite() {
             (0..3).for_each(|k| right[k] += lift * self.normal[k]);
         }
         for k in 0..3 {
