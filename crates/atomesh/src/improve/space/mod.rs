@@ -14,6 +14,7 @@
 
 mod align;
 mod heal;
+mod moves;
 mod parts;
 mod patch;
 mod ring;
@@ -37,8 +38,6 @@ use valley::Valley;
 #[derive(Clone, Copy, Debug, Default)]
 pub struct Space;
 
-/// The greatest floor: 70.53° is that of the equilateral tetrahedron.
-const MOST_ANGLE: f64 = 70.0;
 /// By how many degrees the floor is kept, so that rounding in other coordinates does not break it.
 const MARGIN: f64 = 0.01;
 /// The most rounds of swapping and moving bad cells away; two or three do nearly always.
@@ -64,10 +63,7 @@ impl Improver<3> for Space {
         options: &ImproveOptions,
         watch: &mut dyn Watch,
     ) -> Result<(Mesh<3>, ImproveReport), ImproveError> {
-        if !(0.0..=MOST_ANGLE).contains(&options.min_angle) {
-            let expected = "an angle from 0 to 70 degrees";
-            return Err(ImproveError::MinAngle { value: options.min_angle, expected });
-        }
+        options.validate(3)?;
         let (points, corners) = mesh.into_parts();
         let Some(bounds) = Bounds::of(&points) else {
             let report = ImproveReport { floor_held: true, ..Default::default() };

@@ -9,8 +9,8 @@ use super::patch::{NONE, Patch};
 use crate::geometry::{Bounds, Point};
 use std::collections::HashMap;
 
-/// The points of a part, about: enough that few are held, few enough for all cores and for a cache.
-const PART: usize = 12_000;
+/// The points of a part, about: enough that few are held, few enough for all cores and for a cache. Tests cut small meshes too.
+const PART: usize = if cfg!(test) { 60 } else { 12_000 };
 
 /// Where each pass cuts: the share of the points before the cut.
 pub(super) const CUTS: [f64; 3] = [0.5, 0.3, 0.64];

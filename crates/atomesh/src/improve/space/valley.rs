@@ -82,8 +82,8 @@ impl<'a> Valley<'a> {
         depths.iter().sum::<f64>() / PLACES.len() as f64
     }
 
-    /// What a facet is worth: its area times the square of its mean depth, which prefers one facet within a valley
-    /// to two that cross it.
+    /// What a facet is worth: its area times the fourth power of its mean depth, which prefers one facet within a
+    /// valley to two that cross it or lie beside its bottom.
     #[inline(always)]
     pub fn worth(&self, facet: &[Point<3>; 3], contrast: &Contrast) -> f64 {
         worth(facet, self.mean(facet), contrast)
@@ -91,6 +91,10 @@ impl<'a> Valley<'a> {
 
     /// Adds to a least-squares system for the move of the facet's first corner: along the facet's normal, the
     /// places where it is sampled are to come to the valley's bottom, each moving by its share of the corner's move.
+    ///
+    /// The step is Newton's for the area times the square of the depth, in a valley with the profile of a Gaussian.
+    /// That energy grows with the area, which draws a curved surface outward by σ² times its mean curvature: just
+    /// what blur of the width σ has drawn the valley inward by (Verbeek & van Vliet 1994).
     pub fn pull(&self, facet: &[Point<3>; 3], mean: f64, contrast: &Contrast, system: &mut System) {
         let mean = contrast.of(mean);
         let normal = normal(facet);
@@ -128,7 +132,7 @@ impl<'a> Valley<'a> {
             self.depth(&high) - self.depth(&low)
         });
         let length = dot(&slope, &slope).sqrt();
-        if length < 1e-3 {
+        if length < LEAST_SLOPE {
             return None;
         }
         let along = slope.map(|x| x / length);
@@ -166,10 +170,10 @@ impl<'a> Valley<'a> {
                 offset += (0.5 * (a - c) / bend).clamp(-0.5, 0.5);
             }
         }
-        // of a Gaussian, two steps to both sides of its middle
+        // from a Gaussian's middle to two steps to both sides of it
         let ratio =
             2.0 * contrast.of(depths[deepest]) / (contrast.of(depths[0]) + contrast.of(depths[4]));
-        let variance = if ratio > 1.6 { 2.0 / ratio.min(50.0).ln() } else { 0.0 };
+        let variance = if ratio > PROMINENT { 2.0 / ratio.min(SHARPEST).ln() } else { 0.0 };
         let step = self.step;
         Bottom { offset: offset * step, depth: depths[deepest], variance: variance * step * step }
     }
@@ -201,8 +205,14 @@ pub(super) fn worth(facet: &[Point<3>; 3], mean: f64, contrast: &Contrast) -> f6
 /// Facets of a lesser mean, between the least and the greatest depth around, are not drawn to a valley.
 const LEAST_MEAN: f64 = 0.3;
 
+/// A lesser slope across a step has no direction.
+const LEAST_SLOPE: f64 = 1e-3;
+
 /// Where no place is deeper there is no feature.
 pub(super) const LEAST_DEPTH: f64 = 0.2;
+
+/// Less than this between the least and the greatest depth is noise.
+const LEAST_CONTRAST: f64 = 0.15;
 
 /// The least and the greatest depth around a place: weak features count as much as strong ones elsewhere.
 #[derive(Clone, Copy, Debug)]
@@ -221,7 +231,7 @@ impl Contrast {
     /// A depth between the least, 0, and the greatest, 1.
     #[inline(always)]
     pub fn of(&self, depth: f64) -> f64 {
-        ((depth - self.low) / (self.high - self.low).max(0.15)).max(0.0)
+        ((depth - self.low) / (self.high - self.low).max(LEAST_CONTRAST)).max(0.0)
     }
 }
 
@@ -236,6 +246,13 @@ pub(super) struct System {
     growth: Point<3>,
     count: f64,
 }
+
+/// The facets' normals agree if their sum is this share of its greatest length, squared.
+const AGREED: f64 = 0.9;
+/// A valley's profile falls by this much within two steps to its sides, or it is none.
+const PROMINENT: f64 = 1.6;
+/// What is deeper by more than this share is not told from background.
+const SHARPEST: f64 = 50.0;
 
 impl System {
     /// Adds the wish that `share` of the move, along a unit vector, be `offset`.
@@ -270,7 +287,7 @@ impl System {
         let mut right = self.right;
         let square = dot(&self.normal, &self.normal);
         let lift = dot(&self.growth, &self.normal) / square;
-        if square > 0.9 * self.count * self.count && lift.is_finite() {
+        if square > AGREED * self.count * self.count && lift.is_finite() {
             (0..3).for_each(|k| right[k] += lift * self.normal[k]);
         }
         for k in 0..3 {

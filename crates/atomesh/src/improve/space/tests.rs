@@ -1,0 +1,248 @@
+//! Promises of improved meshes, and swaps against all that there are.
+
+use super::*;
+use crate::distance::NominalDistance;
+use crate::image::Grid;
+use crate::mesh::Delaunay;
+use crate::potential::{ImagePotential, ImageWeight, Interpolation};
+use crate::watch::Silent;
+use patch::Patch;
+use proptest::prelude::*;
+use ring::{MOST, Ring};
+
+/// The box of all tests but those of one cell.
+const SIDE: f64 = 12.0;
+
+/// A dark sheet across the box, two samples wide, through its middle.
+fn sheet(p: &Point<3>) -> f64 {
+    let height = (p[0] + 0.4 * p[1] - 0.3 * p[2] - 0.55 * SIDE) / 1.25_f64.sqrt();
+    -(-0.5 * (height / 1.2).powi(2)).exp()
+}
+
+fn potential(b: impl Fn(&Point<3>) -> f64) -> ImagePotential<3> {
+    let grid = Grid { shape: [13; 3], step: [1.0; 3] };
+    let at = |i: usize| [i % 13, i / 13 % 13, i / 169].map(|k| k as f64);
+    let samples = (0..grid.sample_count()).map(|i| b(&at(i)) as f32).collect();
+    ImagePotential::new(grid, samples, Interpolation::Linear).unwrap()
+}
+
+/// A Delaunay mesh of the box's corners and of points within it, some of them drawn to its sides.
+fn mesh(inside: &[Point<3>]) -> Mesh<3> {
+    let mut points: Vec<Point<3>> =
+        (0..8).map(|c| std::array::from_fn(|k| if c >> k & 1 == 1 { SIDE } else { 0.0 })).collect();
+    for p in inside {
+        points.push(p.map(|x| if x < 1.0 { 0.0 } else { x.min(SIDE + 1.0) }.min(SIDE)));
+    }
+    points.sort_by(|a, b| crate::geometry::lexicographic(a, b));
+    points.dedup();
+    Delaunay::<3>::new().connect(&points, &mut Silent).unwrap()
+}
+
+fn improve(
+    mesh: Mesh<3>,
+    potential: &ImagePotential<3>,
+    beta: f64,
+    options: &ImproveOptions,
+) -> Result<(Mesh<3>, ImproveReport), ImproveError> {
+    let weight = ImageWeight::constant(beta).unwrap();
+    let distance = NominalDistance::constant(potential.grid(), 3.0).unwrap();
+    let fields = Fields { potential, weight: &weight, distance: &distance };
+    let freedom = vec![7; mesh.points().len()];
+    Space.improve(mesh, &freedom, fields, options, &mut Silent)
+}
+
+/// A crystal whose points are moved at random: what a lattice is like.
+fn crystal(shifts: &[f64]) -> Vec<Point<3>> {
+    let place = |n: usize| {
+        let (site, odd) = (n / 2, (n % 2) as f64);
+        [site % 5, site / 5 % 5, site / 25].map(|k| 2.9 * k as f64 + 1.45 * odd)
+    };
+    (0..shifts.len() / 3)
+        .map(|n| std::array::from_fn(|k| (place(n)[k] + shifts[3 * n + k]).max(0.0)))
+        .collect()
+}
+
+fn sides(p: &Point<3>) -> u8 {
+    patch::sides_of(p, &Bounds { min: [0.0; 3], max: [SIDE; 3] })
+}
+
+proptest! {
+    #![proptest_config(ProptestConfig::with_cases(24))]
+    #[test]
+    fn improved_meshes_keep_their_promises(
+        shifts in prop::collection::vec(-0.6..0.6f64, 3 * 180),
+        align in prop::sample::select(vec![Align::Off, Align::Swaps, Align::Full]),
+        min_angle in 0.0..40.0f64,
+    ) {
+        let mesh = mesh(&crystal(&shifts));
+        let options = ImproveOptions { align, min_angle };
+        let (better, report) = improve(mesh.clone(), &potential(sheet), 0.4, &options).unwrap();
+        prop_assert_eq!(better.validate(), Ok(()));
+        prop_assert_eq!(better.points().len(), mesh.points().len());
+        // some thousand roundings of volumes that sum to the box's
+        prop_assert!((better.measure() - SIDE.powi(3)).abs() < 1e-12 * SIDE.powi(3));
+        for (p, q) in mesh.points().iter().zip(better.points()) {
+            prop_assert_eq!(sides(p) & !sides(q), 0, "{:?} left a side for {:?}", p, q);
+            prop_assert!(align == Align::Full || p == q);
+        }
+        // the floor may cost what is above it, but nothing falls below what was worse
+        let kept = report.angle_before.min(min_angle);
+        prop_assert!(report.angle_after > kept - 1e-6, "{:?}", report);
+        prop_assert_eq!(report.floor_held, report.below == 0);
+        prop_assert!(align != Align::Off || better == mesh);
+    }
+}
+
+/// All ways to fill a polygon with triangles: the greatest least worth, and the greatest sum.
+fn best_of_all(i: usize, j: usize, worth: &impl Fn(usize, usize, usize) -> f64) -> (f64, f64) {
+    if j < i + 2 {
+        return (f64::INFINITY, 0.0);
+    }
+    (i + 1..j).fold((f64::NEG_INFINITY, f64::NEG_INFINITY), |best, k| {
+        let (low, high) = (best_of_all(i, k, worth), best_of_all(k, j, worth));
+        let here = worth(i, k, j);
+        (best.0.max(low.0.min(high.0).min(here)), best.1.max(low.1 + high.1 + here))
+    })
+}
+
+/// `count` cells around the edge from point 0 to point 1.
+fn wheel(count: usize, shifts: &[f64]) -> Patch {
+    let mut points = vec![[0.0, 0.0, -1.0], [0.0, 0.0, 1.0]];
+    for n in 0..count {
+        let (sine, cosine) = (std::f64::consts::TAU * n as f64 / count as f64).sin_cos();
+        let r = 1.5 + shifts[2 * n];
+        points.push([r * cosine, r * sine, shifts[2 * n + 1]]);
+    }
+    let at = |n: usize| 2 + (n % count) as u32;
+    let cells = (0..count).map(|n| [0, 1, at(n), at(n + 1)]).collect();
+    let all = points.len();
+    Patch::new(points, vec![7; all], vec![0; all], cells)
+}
+
+proptest! {
+    #[test]
+    fn the_best_filling_is_the_best_of_all(
+        count in 3..=MOST,
+        shifts in prop::collection::vec(-0.5..0.5f64, 2 * MOST),
+    ) {
+        let patch = wheel(count, &shifts);
+        let ring = Ring::around(&patch, 1, 0, 1).unwrap();
+        prop_assert_eq!((ring.count, ring.cell_count), (count, count));
+        let worth = |ring: &Ring, i, k, j| {
+            let cosines = ring.pair(i, k, j).map(|c| patch.shape_of(&c).cosine);
+            -cosines[0].max(cosines[1])
+        };
+        let all = |i, k, j| worth(&ring, i, k, j);
+        let (least, sum) = best_of_all(0, count - 1, &all);
+        let found = ring.fill(f64::NEG_INFINITY, worth, f64::min, f64::INFINITY).unwrap();
+        prop_assert_eq!(found.worth, least);
+        let found = ring.fill(f64::NEG_INFINITY, worth, |a, b| a + b, 0.0).unwrap();
+        prop_assert!((found.worth - sum).abs() < 1e-12); // sums of at most six, in another order
+        let mut cells = Vec::new();
+        ring.filled(&found, &mut cells);
+        prop_assert_eq!(cells.len(), 2 * (count - 2));
+    }
+}
+
+#[test]
+fn a_swap_leaves_neighbours_as_a_new_patch_would_have_them() {
+    let mut patch = wheel(5, &[0.0; 10]);
+    let ring = Ring::around(&patch, 0, 0, 1).unwrap();
+    let worth = |ring: &Ring, i, k, j| {
+        let cosines = ring.pair(i, k, j).map(|c| patch.shape_of(&c).cosine);
+        -cosines[0].max(cosines[1])
+    };
+    let filling = ring.fill(-1.0, worth, f64::min, f64::INFINITY).unwrap();
+    heal::remove_edge(&mut patch, &ring, &filling);
+    let cells: Vec<[u32; 4]> = patch.cells().copied().collect();
+    assert_eq!(cells.len(), 6);
+    let fresh = Patch::new(patch.points.clone(), vec![7; 7], vec![0; 7], cells);
+    let beyond = |patch: &Patch, cell: usize, k: usize| match patch.neighbours[cell][k] {
+        patch::NONE => None,
+        other => Some(patch.corners[other as usize]),
+    };
+    for (cell, corners) in fresh.corners.iter().enumerate() {
+        let same = patch.corners.iter().position(|c| c == corners).unwrap();
+        (0..4).for_each(|k| assert_eq!(beyond(&patch, same, k), beyond(&fresh, cell, k)));
+    }
+}
+
+/// Shifts that repeat but look random.
+fn shifts(count: usize) -> Vec<f64> {
+    (0..count).map(|n| 0.5 * ((n * n) as f64 * 0.618).sin()).collect()
+}
+
+#[test]
+fn the_result_is_the_same_at_any_thread_count() {
+    let run = || {
+        let mesh = mesh(&crystal(&shifts(3 * 250)));
+        improve(mesh, &potential(sheet), 0.4, &ImproveOptions::for_dimension(3)).unwrap()
+    };
+    let with = |threads| {
+        rayon::ThreadPoolBuilder::new().num_threads(threads).build().unwrap().install(run)
+    };
+    let (one, three) = (with(1), with(3));
+    assert!(one.1.swaps > 10 && one.1.moves > 10, "{:?}", one.1);
+    assert_eq!(one, three);
+}
+
+/// The area of facets that lie within 0.3 of the sheet and within 15° of its tangent.
+fn area_on_sheet(mesh: &Mesh<3>) -> f64 {
+    let normal = [1.0, 0.4, -0.3].map(|x: f64| x / 1.25_f64.sqrt());
+    let height = |p: &Point<3>| crate::geometry::dot(p, &normal) - 0.55 * SIDE / 1.25_f64.sqrt();
+    let mut sum = 0.0;
+    for facet in mesh.facets() {
+        let [p, q, r] = facet.corners.map(|c| mesh.points()[c as usize]);
+        let [u, v] = [q, r].map(|x| crate::geometry::difference(&x, &p));
+        let twice = shape::cross(&u, &v);
+        let length = crate::geometry::dot(&twice, &twice).sqrt();
+        let along = crate::geometry::dot(&twice, &normal).abs() > 15f64.to_radians().cos() * length;
+        let near = [p, q, r].iter().all(|x| height(x).abs() < 0.3);
+        sum += if along && near { 0.5 * length } else { 0.0 };
+    }
+    sum
+}
+
+#[test]
+fn facets_come_onto_a_sheet_and_stay_away_where_the_image_has_no_weight() {
+    let start = mesh(&crystal(&shifts(3 * 250)));
+    let options = ImproveOptions::for_dimension(3);
+    let (aligned, _) = improve(start.clone(), &potential(sheet), 0.4, &options).unwrap();
+    let (unaligned, _) = improve(start.clone(), &potential(sheet), 0.0, &options).unwrap();
+    // the sheet's area in the box is SIDE² / cos of its slant, 161
+    assert!(area_on_sheet(&start) < 20.0, "{}", area_on_sheet(&start));
+    assert!(area_on_sheet(&unaligned) < 20.0, "{}", area_on_sheet(&unaligned));
+    assert!(area_on_sheet(&aligned) > 60.0, "{}", area_on_sheet(&aligned));
+}
+
+#[test]
+fn one_cell_and_a_flat_image_are_left_alone() {
+    let points = vec![[0.0; 3], [5.0, 0.0, 0.0], [0.0, 5.0, 0.0], [0.0, 0.0, 5.0]];
+    let cell = Mesh::new(points, vec![0, 1, 2, 3]).unwrap();
+    let options = ImproveOptions::for_dimension(3);
+    let (same, report) = improve(cell.clone(), &potential(|_| 0.0), 0.5, &options).unwrap();
+    assert_eq!(same, cell);
+    assert!(report.floor_held && report.swaps + report.moves == 0);
+}
+
+#[test]
+fn a_floor_out_of_range_is_refused_and_a_watch_ends_the_work() {
+    let mesh = mesh(&crystal(&shifts(3 * 100)));
+    let wrong = ImproveOptions { min_angle: f64::NAN, ..ImproveOptions::for_dimension(3) };
+    let error = improve(mesh.clone(), &potential(sheet), 0.4, &wrong).unwrap_err();
+    assert!(matches!(error, ImproveError::MinAngle { .. }));
+    struct Never;
+    impl Watch for Never {
+        fn step(&mut self, _: Phase, _: f64, _: Option<f64>) -> std::ops::ControlFlow<()> {
+            std::ops::ControlFlow::Break(())
+        }
+    }
+    let potential = potential(sheet);
+    let weight = ImageWeight::constant(0.4).unwrap();
+    let distance = NominalDistance::constant(potential.grid(), 3.0).unwrap();
+    let fields = Fields { potential: &potential, weight: &weight, distance: &distance };
+    let freedom = vec![7; mesh.points().len()];
+    let options = ImproveOptions::for_dimension(3);
+    let ended = Space.improve(mesh, &freedom, fields, &options, &mut Never);
+    assert!(matches!(ended, Err(ImproveError::Cancelled(_))));
+}
