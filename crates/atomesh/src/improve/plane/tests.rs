@@ -351,6 +351,50 @@ fn crowds_are_thinned_out_and_gaps_are_filled() {
 }
 
 #[test]
+fn beyond_the_outline_of_a_mesh_nothing_guides() {
+    let scene = Scene::new(40.0, 1.0);
+    let (mesh, _) = scene.crystal();
+    // without the cells of the lower right quarter: an outline with a corner that turns inwards
+    let [x, y] = scene.bounds().extent().map(|x| 0.5 * x);
+    let middle = |s: &crate::geometry::Simplex<2>| -> Point<2> {
+        std::array::from_fn(|k| (s.first[k] + s.others[0][k] + s.others[1][k]) / 3.0)
+    };
+    let kept = |cell: &&[u32]| {
+        let p = middle(&mesh.simplex(cell));
+        p[0] < x || p[1] > y
+    };
+    let corners: Vec<u32> = mesh.cells().filter(kept).flatten().copied().collect();
+    let mut used: Vec<u32> = corners.clone();
+    used.sort_unstable();
+    used.dedup();
+    let number = |c: &u32| used.binary_search(c).unwrap() as u32;
+    let points: Vec<Point<2>> = used.iter().map(|&c| mesh.points()[c as usize]).collect();
+    let part = Mesh::new(points.clone(), corners.iter().map(number).collect()).unwrap();
+    let found = guides(scene.fields(), &mut Silent).unwrap();
+    let triangles = Triangles::new(part.clone(), &found);
+    let held: Vec<u32> =
+        (0..triangles.len() as u32).flat_map(|c| triangles.guides_in(c).to_vec()).collect();
+    let outside = |i: &u32| {
+        let p = found[*i as usize].position;
+        p[0] > x + 8.0 && p[1] < y - 8.0
+    };
+    assert!(!held.iter().any(outside));
+    let inside = found.iter().filter(|g| g.position[0] < x - 8.0 || g.position[1] > y + 8.0);
+    assert!(held.len() >= inside.count());
+    // the outline holds
+    let hull: Vec<u32> = (part.facets().iter())
+        .filter(|facet| facet.neighbour.is_none())
+        .flat_map(|facet| facet.corners)
+        .collect();
+    let mut freedom = vec![0b11; points.len()];
+    hull.iter().for_each(|&c| freedom[c as usize] = 0);
+    let (improved, _) = scene.improve(&part, &freedom, Align::Full);
+    assert_eq!(improved.validate(), Ok(()));
+    assert!((improved.measure() / part.measure() - 1.0).abs() < 1e-12);
+    assert!(hull.iter().all(|&c| improved.points().contains(&points[c as usize])));
+}
+
+#[test]
 fn floors_that_no_triangle_keeps_are_refused() {
     let scene = Scene::new(40.0, 1.0);
     let (mesh, freedom) = scene.crystal();

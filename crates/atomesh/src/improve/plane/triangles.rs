@@ -1,6 +1,6 @@
 //! Triangles that can be swapped: who is beside whom, and which guides lie in which.
 
-use crate::geometry::Point;
+use crate::geometry::{Bounds, Point};
 use crate::mesh::{Mesh, MeshError};
 
 use super::energy::doubled_area;
@@ -41,31 +41,35 @@ impl Triangles {
         }
         let empty = vec![Vec::new(); corners.len()];
         let mut triangles = Self { points, corners, neighbours, cell_of, guides: empty };
-        let mut cell = 0;
+        let starts = Starts::new(&triangles);
         for (i, guide) in guides.iter().enumerate() {
-            cell = triangles.locate(guide.position, cell);
-            triangles.guides[cell as usize].push(i as u32);
+            // beyond the outline of a mesh that is not convex there is nothing to guide
+            if let Some(cell) = triangles.locate(guide.position, starts.near(guide.position)) {
+                triangles.guides[cell as usize].push(i as u32);
+            }
         }
         triangles
     }
 
-    /// The cell that holds a point of the box: a walk from `start`, each time across the side that the point
-    /// is farthest beyond. Among Delaunay's cells it ends; among others it ends somewhere.
-    fn locate(&self, p: Point<2>, start: u32) -> u32 {
+    /// The cell that holds a point, if a walk from `start` reaches one: each time across the side that the point
+    /// is farthest beyond. Among Delaunay's cells of a convex box it does.
+    fn locate(&self, p: Point<2>, start: u32) -> Option<u32> {
         let mut cell = start;
         for _ in 0..self.corners.len() {
-            let corners = self.corners_at(cell);
-            let sides =
-                [0, 1, 2].map(|k| doubled_area(corners[(k + 1) % 3], corners[(k + 2) % 3], p));
-            let beyond =
-                (0..3).min_by(|&i, &j| sides[i].total_cmp(&sides[j])).expect("three sides");
+            let [a, b, c] = self.corners_at(cell);
+            let sides = [doubled_area(b, c, p), doubled_area(c, a, p), doubled_area(a, b, p)];
+            let beyond = (0..3).min_by(|&i, &j| sides[i].total_cmp(&sides[j]))?;
             let next = self.neighbours[cell as usize][beyond];
-            if sides[beyond] >= 0.0 || next == NONE {
-                break;
+            if sides[beyond] >= 0.0 {
+                return Some(cell);
+            }
+            if next == NONE {
+                // a rounding beyond the hull is still within
+                return (sides[beyond] >= -1e-9 * doubled_area(a, b, c)).then_some(cell);
             }
             cell = next;
         }
-        cell
+        None
     }
 
     /// The number of cells, those that have gone too.
@@ -257,4 +261,39 @@ pub(super) struct Pair {
     pub cells: [u32; 2],
     pub edge: [u32; 2],
     pub apices: [u32; 2],
+}
+
+/// A cell near any place, from which to walk: of squares about as large as two cells, one cell each.
+struct Starts {
+    low: Point<2>,
+    side: f64,
+    columns: usize,
+    cells: Vec<u32>,
+}
+
+impl Starts {
+    fn new(triangles: &Triangles) -> Self {
+        let bounds = Bounds::of(&triangles.points);
+        let (low, extent) = bounds.map_or(([0.0; 2], [0.0; 2]), |b| (b.min, b.extent()));
+        let cell_count = triangles.corners.len().max(1);
+        let side = (2.0 * extent[0] * extent[1] / cell_count as f64).sqrt();
+        let [columns, rows] = extent.map(|x| (x / side) as usize + 1);
+        let mut starts = Self { low, side, columns, cells: vec![0; columns * rows] };
+        for cell in 0..triangles.corners.len() as u32 {
+            let [a, b, c] = triangles.corners_at(cell);
+            let middle = std::array::from_fn(|k| (a[k] + b[k] + c[k]) / 3.0);
+            let place = starts.place(middle);
+            starts.cells[place] = cell;
+        }
+        starts
+    }
+
+    fn place(&self, p: Point<2>) -> usize {
+        let [column, row] = [0, 1].map(|k| ((p[k] - self.low[k]) / self.side) as usize);
+        (column.min(self.columns - 1) + row * self.columns).min(self.cells.len() - 1)
+    }
+
+    fn near(&self, p: Point<2>) -> u32 {
+        self.cells[self.place(p)]
+    }
 }
