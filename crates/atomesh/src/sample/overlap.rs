@@ -76,7 +76,7 @@ impl Overlaps {
     /// look inward. The sums that make them may leave roundings in boxes that the cell just misses.
     pub fn each_row(&mut self, surface: &Surface, mut visit: impl FnMut([usize; 3], &[f64])) {
         let Some((first, last)) = self.reach(surface) else { return };
-        self.rows.cut = surface.corners.iter().any(|p| p[0] < 0.0);
+        self.rows.cut = surface.corners.iter().any(|p| p[0] <= 0.0);
         self.rests.resize_with(surface.ends.len(), Vec::new);
         for (rest, facet) in self.rests.iter_mut().zip(surface.facets()) {
             rest.clear();
@@ -139,7 +139,7 @@ impl Overlaps {
 struct Rows {
     first: [usize; 2],
     shape: [usize; 2],
-    /// Whether the cell goes on before box 0 of rows: then rows fill from there.
+    /// Whether the cell may begin at box 0 or before, where no piece tells of it: then rows fill from there.
     cut: bool,
     /// The first and the last boxes of each row that pieces are in.
     reached: Vec<[usize; 2]>,
