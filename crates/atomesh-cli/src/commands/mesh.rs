@@ -382,7 +382,7 @@ impl Job<'_> {
                 let path = match *name {
                     "size field" => self.run.input.size_field.as_deref(),
                     "mask" => self.run.input.mask.as_deref(),
-                    "labels" => self.run.input.labels.as_deref(),
+                    "label image" => self.run.input.labels.as_deref(),
                     _ => self.run.input.beta_field.as_deref(),
                 };
                 field_failure(&error, path)

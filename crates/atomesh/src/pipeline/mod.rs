@@ -120,7 +120,7 @@ pub fn prepare<'m, const D: usize>(
     let mut warnings = Vec::new();
     let labels = match inputs.labels {
         Some(labels) => {
-            same_shape("labels", &frame, labels)?;
+            same_shape("label image", &frame, labels)?;
             Some(label_samples(labels.samples())?)
         }
         None => None,
