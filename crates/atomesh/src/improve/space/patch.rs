@@ -78,11 +78,24 @@ impl Patch {
             search: 0,
             facets: Vec::new(),
         };
+        patch.hold_rim();
         for cell in 0..patch.corners.len() {
             let shape = patch.shape_of(&patch.corners[cell]);
             patch.shapes.push(shape);
         }
         patch
+    }
+
+    /// Holds the corners of facets with nothing beyond, unless the facet lies on a side of the box: points slide there.
+    fn hold_rim(&mut self) {
+        for (corners, neighbours) in self.corners.iter().zip(&self.neighbours) {
+            for k in (0..4).filter(|&k| neighbours[k] == NONE) {
+                let facet = [1, 2, 3].map(|n| corners[(k + n) & 3] as usize);
+                if facet.iter().fold(63, |all, &p| all & self.sides[p]) == 0 {
+                    facet.iter().for_each(|&p| self.freedom[p] = 0);
+                }
+            }
+        }
     }
 
     /// The shape of a cell that these corners would make.

@@ -1,0 +1,46 @@
+//! Improving tetrahedra: the slivers of a mesh without features, and facets of one with a sphere.
+
+use atomesh::distance::NominalDistance;
+use atomesh::enhance::{FeatureOptions, Features, enhance};
+use atomesh::image::Units;
+use atomesh::improve::{Align, ImproveOptions, Improver, Space};
+use atomesh::lattice::{Crystal, GrowOptions, grow};
+use atomesh::mesh::Delaunay;
+use atomesh::optimize::{Fields, OptimizeOptions, optimize};
+use atomesh::potential::{ImagePotential, ImageWeight, Interpolation};
+use atomesh::synth::{Scene, SynthOptions, synthesize};
+use atomesh::watch::Silent;
+use criterion::{Criterion, criterion_group, criterion_main};
+
+fn benches(criterion: &mut Criterion) {
+    let image = synthesize(Scene::Sphere, &SynthOptions::new([96; 3])).expect("a sphere").image;
+    let edges = FeatureOptions { features: Features::Edges, ..Default::default() };
+    let b = enhance(&image, &edges, &mut Silent).expect("edges").values;
+    let grid = image.frame().grid(Units::Physical);
+    let potential = ImagePotential::new(grid, b, Interpolation::Linear).expect("a potential");
+    let weight = ImageWeight::constant(0.45).expect("a weight");
+    let distance = NominalDistance::constant(&grid, 4.0).expect("a distance");
+    let fields = Fields { potential: &potential, weight: &weight, distance: &distance };
+    let crystal = Crystal::body_centered_cubic();
+    let lattice = grow(&crystal, grid.bounds(), &distance, &GrowOptions::default(), &mut Silent);
+    let options = OptimizeOptions::for_dimension(3);
+    let lattice = optimize(lattice.expect("a lattice"), fields, &options, &mut Silent);
+    let (lattice, _) = lattice.expect("an optimized lattice").into_parts();
+    let mesh = Delaunay::<3>::new().connect(lattice.atoms(), &mut Silent).expect("a mesh");
+    let freedom = vec![7; mesh.points().len()];
+
+    let mut group = criterion.benchmark_group("improve");
+    group.sample_size(10);
+    for align in [Align::Swaps, Align::Full] {
+        let options = ImproveOptions { align, ..ImproveOptions::for_dimension(3) };
+        let name = format!("{align:?}, {} cells", mesh.cell_count());
+        group.bench_function(name, |bencher| {
+            let improve = || Space.improve(mesh.clone(), &freedom, fields, &options, &mut Silent);
+            bencher.iter(improve);
+        });
+    }
+    group.finish();
+}
+
+criterion_group!(improve, benches);
+criterion_main!(improve);
