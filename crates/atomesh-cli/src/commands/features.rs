@@ -71,7 +71,7 @@ pub struct FeaturesArgs {
     #[arg(long, value_name = "VALUE", default_value = "mean",
         value_parser = named::<FacetTest>(&["mean", "max"]))]
     test: FacetTest,
-    /// Pieces of fewer facets are dropped, unless others would come apart
+    /// Pieces of fewer facets are dropped
     #[arg(long, value_name = "COUNT", default_value_t = 3)]
     min_facets: usize,
     /// Pieces of less length (2-D) or area (3-D), in world units, are dropped likewise

@@ -123,7 +123,7 @@ fn binary_stl(bytes: &[u8]) -> Result<LoadedSurface, SurfaceReadError> {
     let rest = bytes.get(80..).unwrap_or_default();
     let count = rest.first_chunk::<4>().map_or(0, |b| u32::from_le_bytes(*b)) as usize;
     let records = rest.get(4..).unwrap_or_default();
-    if records.len() != count.saturating_mul(50) {
+    if bytes.len() < 84 || records.len() != count.saturating_mul(50) {
         let found = format!("{} bytes for {count}", records.len());
         return Err(malformed("50 bytes for each triangle after a head of 84", found));
     }

@@ -28,9 +28,32 @@ pub(super) fn measure_and_mean<const D: usize>(
     (measure, if measure > 0.0 { sum / measure } else { 0.0 })
 }
 
-/// The chosen facets without the worse of small pieces that lead the same way, and without small pieces that
-/// end free. What is left may then be one piece, so that little is dropped at a time: twins before free ends,
-/// of these the pieces of fewest facets first, until nothing is to be dropped.
+/// The chosen facets without one of each cell all of whose facets are chosen, that with the highest mean of b:
+/// a feature passes through a cell, it does not wrap it.
+pub(super) fn thin<const D: usize>(field: &FacetField<D>, chosen: Vec<u32>) -> Vec<u32> {
+    let cells = |facet: u32| {
+        let facet = &field.facets()[facet as usize];
+        std::iter::once(facet.cell).chain(facet.neighbour)
+    };
+    let cell_count = chosen.iter().flat_map(|&f| cells(f)).max().map_or(0, |c| c as usize + 1);
+    // how many facets of each cell are chosen, and the one of the highest mean, the last of equal ones
+    let mut of_cells = vec![(0, 0_u32); cell_count];
+    for &facet in &chosen {
+        for cell in cells(facet) {
+            let (count, worst) = &mut of_cells[cell as usize];
+            if *count == 0 || field.mean()[facet as usize] >= field.mean()[*worst as usize] {
+                *worst = facet;
+            }
+            *count += 1;
+        }
+    }
+    let whole = |cell: u32, facet: u32| of_cells[cell as usize] == (D + 1, facet);
+    chosen.into_iter().filter(|&facet| !cells(facet).any(|cell| whole(cell, facet))).collect()
+}
+
+/// The chosen facets without small pieces. Dropping one may make others into one piece that is large, so
+/// little is dropped at a time: first of pieces with the same rim all but that of the lowest mean of b; then
+/// those of fewest facets, the highest mean first, no two that meet at once.
 pub(super) fn drop_small<const D: usize>(
     mesh: &Mesh<D>,
     field: &FacetField<D>,
@@ -50,6 +73,13 @@ pub(super) fn drop_small<const D: usize>(
     chosen
 }
 
+/// A piece that is small: the ridges where it meets others, the mean of b, and its facets by place.
+struct Small {
+    rim: Vec<u64>,
+    mean: f64,
+    facets: Vec<u32>,
+}
+
 /// The facets, by place, that one round drops.
 fn worst<const D: usize>(
     mesh: &Mesh<D>,
@@ -58,51 +88,47 @@ fn worst<const D: usize>(
     options: &FeatureFacetOptions,
 ) -> Vec<u32> {
     let ridges = Ridges::new(field, chosen);
-    // the small pieces that end free, and those between others by their rims
-    let (mut free, mut joined) = (Vec::new(), Vec::new());
-    for piece in ridges.pieces() {
-        let facets = piece.iter().map(|&at| chosen[at as usize]);
-        let (measure, mean) = measure_and_mean(mesh, field, facets);
-        if piece.len() < options.min_facets || measure < options.min_measure {
-            match rim(&ridges, &piece) {
-                Rim::Free => free.push(piece),
-                Rim::Joined(rim) => joined.push((rim, mean, piece)),
-            }
+    let mut small = Vec::new();
+    for facets in ridges.pieces() {
+        let indices = facets.iter().map(|&at| chosen[at as usize]);
+        let (measure, mean) = measure_and_mean(mesh, field, indices);
+        if facets.len() < options.min_facets || measure < options.min_measure {
+            small.push(Small { rim: rim(&ridges, &facets), mean, facets });
         }
     }
     // the deepest first, and of equal ones that with the lowest facets
-    joined.sort_by(|a, b| a.0.cmp(&b.0).then(a.1.total_cmp(&b.1)).then(a.2.cmp(&b.2)));
-    let twins = joined.windows(2).filter(|pair| pair[0].0 == pair[1].0);
-    let dropped: Vec<u32> = twins.flat_map(|pair| pair[1].2.iter().copied()).collect();
+    small.sort_by(|a, b| {
+        a.rim.cmp(&b.rim).then(a.mean.total_cmp(&b.mean)).then(a.facets.cmp(&b.facets))
+    });
+    // two points bound a way in the plane, three edges or more a patch in space
+    let is_twin = |pair: &&[Small]| pair[0].rim.len() >= D && pair[0].rim == pair[1].rim;
+    let twins = small.windows(2).filter(is_twin);
+    let dropped: Vec<u32> = twins.flat_map(|pair| pair[1].facets.iter().copied()).collect();
     if !dropped.is_empty() {
         return dropped;
     }
-    let fewest = free.iter().map(Vec::len).min().unwrap_or(0);
-    free.into_iter().filter(|piece| piece.len() == fewest).flatten().collect()
-}
-
-/// How a piece ends.
-enum Rim {
-    /// At least one ridge is its own alone, or it has no rim at all.
-    Free,
-    /// Everywhere at other pieces: the ridges, ascending.
-    Joined(Vec<u64>),
-}
-
-fn rim<const D: usize>(ridges: &Ridges<D>, piece: &[u32]) -> Rim {
-    let mut joined = Vec::new();
-    for &at in piece {
-        for opposite in 0..D {
-            match ridges.count(at, opposite) {
-                1 => return Rim::Free,
-                2 => {}
-                _ => joined.push(ridges.key(at, opposite)),
-            }
+    let fewest = small.iter().map(|piece| piece.facets.len()).min().unwrap_or(0);
+    small.retain(|piece| piece.facets.len() == fewest);
+    small.sort_by(|a, b| b.mean.total_cmp(&a.mean).then(a.facets.cmp(&b.facets)));
+    let mut touched = HashSet::new();
+    let mut dropped = Vec::new();
+    for piece in small {
+        if !piece.rim.iter().any(|ridge| touched.contains(ridge)) {
+            touched.extend(piece.rim);
+            dropped.extend(piece.facets);
         }
     }
+    dropped
+}
+
+/// The ridges where a piece meets others, ascending.
+fn rim<const D: usize>(ridges: &Ridges<D>, piece: &[u32]) -> Vec<u64> {
+    let sides = piece.iter().flat_map(|&at| (0..D).map(move |opposite| (at, opposite)));
+    let joined = sides.filter(|&(at, opposite)| ridges.count(at, opposite) > 2);
+    let mut joined: Vec<u64> = joined.map(|(at, opposite)| ridges.key(at, opposite)).collect();
     joined.sort_unstable();
     joined.dedup();
-    if joined.is_empty() { Rim::Free } else { Rim::Joined(joined) }
+    joined
 }
 
 /// The chosen facets, ascending, and those that join free ridges of them without turning by more than 60°:

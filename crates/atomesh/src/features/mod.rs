@@ -125,7 +125,7 @@ pub struct Selection {
     pub chosen: usize,
     /// Facets added to close gaps.
     pub added: usize,
-    /// Facets dropped since their piece was small, or double to another.
+    /// Facets dropped since they wrapped a cell, or their piece was small.
     pub dropped: usize,
 }
 
@@ -154,9 +154,10 @@ pub struct FeatureReport {
 
 /// Finds the features of a mesh among facets with their values of b.
 ///
-/// A piece is dropped if it is small and has a free end or border, or if it is small and another piece has
-/// the same ends or border at other pieces, as the two ways through a flat tetrahedron do: of these the one
-/// with the lowest mean of b stays. Small pieces that join others stay, since others would come apart.
+/// Of a cell all of whose facets are chosen, that with the highest mean of b is dropped. Small pieces are
+/// dropped: of those with the same ends or rim at other pieces, as the two ways through a flat tetrahedron
+/// are, all but that with the lowest mean; then those of fewest facets first, since others may be one piece
+/// without them.
 ///
 /// # Errors
 /// [`FeaturesError`] if an option is out of range.
@@ -175,9 +176,11 @@ pub fn find_features<const D: usize>(
         .filter(|&facet| field.value(facet as usize, options.test) <= options.below)
         .collect();
     let mut selection = Selection { chosen: chosen.len(), ..Selection::default() };
+    chosen = clean::thin(field, chosen);
     if options.close_gaps {
+        let before = chosen.len();
         chosen = clean::close_gaps(mesh, field, chosen);
-        selection.added = chosen.len() - selection.chosen;
+        selection.added = chosen.len() - before;
     }
     let kept = clean::drop_small(mesh, field, chosen, options);
     selection.dropped = selection.chosen + selection.added - kept.len();

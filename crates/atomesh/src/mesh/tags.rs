@@ -4,7 +4,7 @@
 //! are moved to, and no other. A facet may be in several groups. Names are such that every mesh format can
 //! hold them.
 
-use std::collections::HashMap;
+use std::collections::{HashMap, HashSet};
 
 use super::Mesh;
 use crate::geometry::Bounds;
@@ -198,19 +198,25 @@ impl<const D: usize> Tags<D> {
     /// # Errors
     /// [`TagsError`] if both have regions, or a region of one has the name of a group of the other.
     pub fn merge(mut self, other: Self) -> Result<Self, TagsError> {
+        let groups = self.facet_groups.iter().enumerate();
+        let places: HashMap<String, usize> =
+            groups.map(|(place, group)| (group.name.clone(), place)).collect();
+        let mut ids: HashSet<u32> = self.facet_groups.iter().map(|group| group.id).collect();
+        let mut greatest = ids.iter().copied().max().unwrap_or(0);
         for mut group in other.facet_groups {
-            if let Some(own) = self.facet_groups.iter_mut().find(|own| own.name == group.name) {
+            if let Some(&place) = places.get(&group.name) {
+                let own = &mut self.facet_groups[place];
                 own.facets.append(&mut group.facets);
                 keep_first(&mut own.facets);
                 continue;
             }
-            let ids = || self.facet_groups.iter().map(|own| own.id);
-            if ids().any(|id| id == group.id) {
-                let greatest = ids().max().unwrap_or(0);
+            if ids.contains(&group.id) {
                 group.id = greatest
                     .checked_add(1)
                     .ok_or_else(|| TagsError::Id { name: group.name.clone(), id: greatest })?;
             }
+            ids.insert(group.id);
+            greatest = greatest.max(group.id);
             self.facet_groups.push(group);
         }
         self.regions = match (self.regions, other.regions) {
@@ -233,9 +239,9 @@ impl<const D: usize> Tags<D> {
     /// Whether ids are in order, and names fit every format and differ.
     fn check_names(&self) -> Result<(), TagsError> {
         let mut names: Vec<&str> = Vec::new();
-        for (at, group) in self.facet_groups.iter().enumerate() {
-            let taken = self.facet_groups[..at].iter().any(|other| other.id == group.id);
-            if group.id == 0 || taken {
+        let mut ids = HashSet::new();
+        for group in &self.facet_groups {
+            if group.id == 0 || !ids.insert(group.id) {
                 return Err(TagsError::Id { name: group.name.clone(), id: group.id });
             }
             names.push(&group.name);
@@ -302,7 +308,7 @@ fn ascending<const D: usize>(facet: &[u32; D]) -> [u32; D] {
 
 /// Keeps the first of facets with the same corners, in their order.
 fn keep_first<const D: usize>(facets: &mut Vec<[u32; D]>) {
-    let mut found = std::collections::HashSet::new();
+    let mut found = HashSet::new();
     facets.retain(|facet| found.insert(ascending(facet)));
 }
 
