@@ -119,7 +119,7 @@ fn groups_alone_are_read_as_they_were_written() {
 
 #[test]
 fn regions_keep_their_numbers_even_those_below_one_and_their_names() {
-    let names = [(3, "salt"), (-1, "outside")];
+    let names = [(-1, "outside"), (3, "salt")];
     let mesh = Delaunay::<2>::new().connect(&points(4), &mut Silent).unwrap();
     check(&mesh, &tagged(&mesh, Some(regions(mesh.cell_count(), &names))), flat);
     let mesh = Delaunay::<3>::new().connect(&points(3), &mut Silent).unwrap();
