@@ -294,9 +294,14 @@ impl Outputs {
         provenance: &Provenance,
         watch: &mut Progress,
     ) -> Result<(), Failure> {
-        let (Some(mesh), Some(features)) = (outcome.world_cells(), outcome.cell_features()) else {
+        let Some(mesh) = outcome.world_cells() else {
             return Err(Failure::content("the run made no Voronoi cells"));
         };
+        // the VTU file does not name them
+        let names_features =
+            self.connections.is_some() || matches!(self.mesh_format, Format::CellsFoam);
+        let features = names_features.then(|| outcome.cell_features()).flatten();
+        let features = features.unwrap_or_default();
         let frame = outcome.frame();
         let data = CellData { mesh: &mesh, features: &features, frame, provenance };
         let written = match self.mesh_format {

@@ -7,13 +7,14 @@ use atomesh::enhance::{EnhanceError, Features};
 use atomesh::image::Image;
 use atomesh::improve::{ImproveError, ImproveReport};
 use atomesh::lattice::LatticeError;
-use atomesh::measure::{ShapeReport, shape};
+use atomesh::measure::{AlignmentReport, ShapeReport, shape};
 use atomesh::optimize::OptimizeError;
 use atomesh::pipeline::{
     Inputs, MeshReport, Outcome, PipelineError, Prepared, VoronoiReport, prepare,
 };
 use atomesh::potential::PotentialError;
 use atomesh::region::RegionError;
+use atomesh::voronoi::PolyReport;
 use atomesh::watch::Watch;
 use atomesh_io::image::AnyImage;
 use serde_json::json;
@@ -156,8 +157,9 @@ impl Job<'_> {
         if let (Some(path), Some(image)) = (&outputs.html, &image) {
             self.write_page(path, (&outcome, image), &figures, dimension, watch)?;
         }
-        if let Some(report) = &figures.cells {
-            watch.say(&cells_summary(&outputs.mesh, report, dimension, watch));
+        if let Some(shape) = &figures.cells {
+            let recall = figures.cells_alignment.as_ref().and_then(|a| a.recall);
+            watch.say(&cells_summary(&outputs.mesh, (shape, recall), dimension, watch));
         } else if let Some(shape) = &figures.shape {
             let (mesh, improved) = (&outputs.mesh, outcome.improve_report());
             watch.say(&summary(mesh, shape, improved, dimension, watch));
@@ -246,16 +248,24 @@ impl Job<'_> {
         watch: &mut Progress,
     ) -> Result<Figures, Failure> {
         let is_quiet = watch.verbosity() == Verbosity::Quiet;
-        if outcome.cells().is_some() && (image.is_some() || !is_quiet) {
-            let cells = outcome.cells_report(watch).map_err(|e| self.failure(e))?;
-            return Ok(Figures { cells, ..Figures::default() });
+        if let Some(cells) = outcome.cells() {
+            let mut figures = Figures::default();
+            if image.is_some() {
+                let report = outcome.cells_report(watch).map_err(|e| self.failure(e))?;
+                (figures.cells, figures.cells_alignment) =
+                    report.map(|VoronoiReport { shape, alignment, .. }| (shape, alignment)).unzip();
+            } else if !is_quiet {
+                let bounds = outcome.potential().grid().bounds();
+                figures.cells = Some(PolyReport::new(cells, &bounds));
+            }
+            return Ok(figures);
         }
         if let Some(image) = image {
             let mut report = outcome.report(watch).map_err(|e| self.failure(e))?;
             let fidelity = outcome.fidelity(image.samples(), watch);
             report.fidelity = Some(fidelity.map_err(|e| self.failure(e))?);
             let shape = Some(report.shape.clone());
-            return Ok(Figures { shape, report: Some(report), cells: None });
+            return Ok(Figures { shape, report: Some(report), ..Figures::default() });
         }
         if is_quiet {
             return Ok(Figures::default());
@@ -414,21 +424,22 @@ fn field_failure(error: &PipelineError, path: Option<&Path>) -> Failure {
 struct Figures {
     shape: Option<ShapeReport>,
     report: Option<MeshReport>,
-    cells: Option<VoronoiReport>,
+    cells: Option<PolyReport>,
+    cells_alignment: Option<AlignmentReport>,
 }
 
 impl Figures {
     /// The shape of what the mesh is made of.
     fn shape_json(&self) -> serde_json::Value {
         match &self.cells {
-            Some(cells) => json!(cells.shape),
+            Some(shape) => json!(shape),
             None => json!(self.report.as_ref().map(|r| &r.shape)),
         }
     }
 
     fn alignment_json(&self) -> serde_json::Value {
-        match &self.cells {
-            Some(cells) => json!(cells.alignment),
+        match &self.cells_alignment {
+            Some(alignment) => json!(alignment),
             None => json!(self.report.as_ref().map(|r| &r.alignment)),
         }
     }
@@ -436,12 +447,12 @@ impl Figures {
 
 fn cells_summary<const D: usize>(
     path: &Path,
-    report: &VoronoiReport,
+    (shape, recall): (&PolyReport, Option<f64>),
     dimension: &Dimension<D>,
     watch: &Progress,
 ) -> String {
-    let (shape, name) = (&report.shape, dimension.voronoi_cells);
-    let followed = match report.alignment.recall {
+    let name = dimension.voronoi_cells;
+    let followed = match recall {
         Some(recall) => format!("; {:.0} % of features followed", 100.0 * recall),
         None => String::new(),
     };

@@ -11,7 +11,7 @@ use crate::potential::ImagePotential;
 const BLOCK: usize = 1 << 10;
 
 /// Faces on features, in connected groups.
-#[derive(Clone, Debug, PartialEq)]
+#[derive(Clone, Debug, Default, PartialEq)]
 pub struct FeatureFaces {
     /// For each face the number of its feature, from 1 on in the order of falling area, or 0.
     pub of_faces: Vec<u32>,
@@ -24,14 +24,14 @@ pub struct FeatureFaces {
 /// Finds the faces inside the box on which |b| is `least` or more in the mean, grouped by shared edges (2-D:
 /// points). |b|, since b is negated where atoms are to line up alongside features and faces to fall on them.
 /// Groups smaller than `least_area` are left out. The mesh is in lattice coordinates. The mean is taken at points
-/// about half a sample apart.
+/// at most a sample apart.
 pub fn feature_faces<const D: usize>(
     mesh: &PolyMesh<D>,
     potential: &ImagePotential<D>,
     least: f64,
     least_area: f64,
 ) -> FeatureFaces {
-    let step = 0.5 * potential.grid().least_step();
+    let step = potential.grid().least_step();
     let faces = (0..mesh.inner_face_count()).into_par_iter().with_min_len(BLOCK);
     let strengths: Vec<f32> = faces.map(|face| strength(mesh, potential, face, step)).collect();
     let chosen: Vec<usize> =
