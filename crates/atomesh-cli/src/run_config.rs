@@ -311,7 +311,7 @@ impl RunConfig {
     /// stays the same when defaults change.
     pub fn with_defaults<const D: usize>(self) -> Self {
         let mesh = MeshOptions::<D>::for_kind(self.lattice.mesh.unwrap_or_default());
-        let features = mesh.features.clone();
+        let features = mesh.features;
         let moves = mesh.optimize.clone();
         let mut defaults = Self {
             lattice: LatticeOptions {
