@@ -18,7 +18,7 @@ use crate::outputs::check_writable;
 use crate::progress::{Progress, writing};
 use crate::values::number_in;
 
-/// Give each cell of a mesh the mean, the total or another property of an image inside it
+/// Give each cell of a mesh the mean, total or majority of an image inside it
 ///
 /// Every sample stands for the box around it and counts by the exact volume (2-D: area) of that box that lies in
 /// the cell. Boxes are cut at the rim of the image, where meshes end, so totals are conserved: over a mesh that
