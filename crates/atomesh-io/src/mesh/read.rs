@@ -156,10 +156,8 @@ impl Parts {
                 *n = 0;
             }
         }
-        let mut count = 0;
-        for n in number.iter_mut().filter(|n| **n == 0) {
-            *n = count;
-            count += 1;
+        for (place, n) in number.iter_mut().filter(|n| **n == 0).enumerate() {
+            *n = place as u32; // there are fewer than 2^32 points
         }
         for corner in cells.iter_mut() {
             // a corner that is no point stays one that is none
