@@ -143,7 +143,7 @@ fn random_options<const D: usize>(random: &mut Pcg64, image: &Image<D>) -> MeshO
             random,
             &[Interpolation::Linear, Interpolation::Spline, Interpolation::Nearest],
         ),
-        kind: one_of(random, &[MeshKind::Delaunay, MeshKind::Delaunay, MeshKind::Voronoi]),
+        kind: MeshKind::default(),
         units,
         size: one_of(
             random,
