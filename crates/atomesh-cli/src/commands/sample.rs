@@ -262,7 +262,7 @@ fn write<const D: usize>(
     fields: &[CellField],
     watch: &mut Progress,
 ) -> Result<(), Failure> {
-    let mut data = MeshData::new(&loaded.mesh);
+    let mut data = MeshData::new(&loaded.mesh).with_tags(&loaded.tags);
     for field in &loaded.point_fields {
         data = data.with_point_field(&field.name, &field.values).map_err(Failure::content)?;
     }

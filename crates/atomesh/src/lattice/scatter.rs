@@ -292,7 +292,8 @@ impl<const D: usize> Spread<'_, D> {
     }
 }
 
-/// The centre and radius of the sphere through D + 1 points; `None` if they are flat to rounding.
+/// The centre and radius of the sphere through D + 1 points; `None` if rounding leaves it open, as they are flat
+/// or nearly so.
 fn circumsphere<'a, const D: usize>(
     mut corners: impl Iterator<Item = &'a Point<D>>,
 ) -> Option<(Point<D>, f64)> {
@@ -308,5 +309,9 @@ fn circumsphere<'a, const D: usize>(
     }
     let offset = right.map(|[x]| x);
     let radius = dot(&offset, &offset).sqrt();
-    radius.is_finite().then(|| (std::array::from_fn(|k| first[k] + offset[k]), radius))
+    let centre = std::array::from_fn(|k| first[k] + offset[k]);
+    // of cells that are nearly flat it may be anywhere, on another atom too
+    let off = |row: &Point<D>| (distance_squared(row, &offset).sqrt() - radius).abs();
+    let is_sound = rows.iter().map(off).fold(0.0, f64::max) <= 1e-6 * radius;
+    (radius.is_finite() && is_sound).then_some((centre, radius))
 }

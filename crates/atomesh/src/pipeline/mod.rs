@@ -48,7 +48,7 @@ use crate::region::{
     Outline, RegionError, Trimmed, fit, islands, label_samples, majority, outline_facets, smooth,
     trim,
 };
-use crate::voronoi::{PolyMesh, voronoi};
+use crate::voronoi::{PolyMesh, sites_apart, voronoi};
 use crate::watch::{Phase, Watch, check};
 use rayon::prelude::*;
 
@@ -359,7 +359,8 @@ impl<const D: usize> Prepared<'_, D> {
             return Ok(None);
         }
         let delaunay = self.method.delaunay();
-        Ok(Some(voronoi(delaunay, mesh.points(), self.grid.bounds(), watch)?))
+        let bounds = self.grid.bounds();
+        Ok(Some(voronoi(delaunay, &sites_apart(mesh, &bounds), bounds, watch)?))
     }
 
     /// Connects the atoms; with the axes along which the box lets each point move.

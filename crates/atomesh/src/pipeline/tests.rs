@@ -64,6 +64,10 @@ fn assert_sound<const D: usize>(outcome: &Outcome<D>, what: &str) {
     for stage in &outcome.optimize_report().stages {
         assert!(stage.energy_last <= stage.energy_first, "{what}: {stage:?}");
     }
+    if let Some(cells) = outcome.cells() {
+        assert_eq!(cells.validate(&bounds), Ok(()), "{what}");
+        assert!((cells.measure() / bounds.measure() - 1.0).abs() < 1e-12, "{what}");
+    }
 }
 
 fn one_of<T: Clone>(random: &mut Pcg64, choices: &[T]) -> T {
@@ -177,12 +181,17 @@ fn random_options<const D: usize>(random: &mut Pcg64, image: &Image<D>) -> MeshO
 }
 
 /// Runs many images; returns how many ended in a mesh.
-fn meshes_or_refusals<const D: usize>(method: &Method<D>, count: u64, greatest: usize) -> u64 {
+fn meshes_or_refusals<const D: usize>(
+    method: &Method<D>,
+    mesh_kind: MeshKind,
+    count: u64,
+    greatest: usize,
+) -> u64 {
     let mut meshes = 0;
     for seed in 0..count {
         let mut random = Pcg64::seed_from_u64(seed);
         let image = random_image::<D>(&mut random, greatest);
-        let options = random_options(&mut random, &image);
+        let options = MeshOptions { kind: mesh_kind, ..random_options(&mut random, &image) };
         let what = format!("{D}-D, seed {seed}: {:?} {options:?}", image.frame());
         let (kind, weight) = (options.lattice, options.image_weight);
         let (chosen, step) = (options.size, image.frame().grid(options.units).least_step());
@@ -210,14 +219,22 @@ fn meshes_or_refusals<const D: usize>(method: &Method<D>, count: u64, greatest: 
 
 #[test]
 fn any_flat_image_ends_in_a_mesh_or_a_clear_refusal() {
-    let meshes = meshes_or_refusals(&Method::flat(), 140, 40);
+    let meshes = meshes_or_refusals(&Method::flat(), MeshKind::Delaunay, 140, 40);
     assert!(meshes > 70, "{meshes}"); // some 45 of 100 ask for what there is not
 }
 
 #[test]
 fn any_volume_ends_in_a_mesh_or_a_clear_refusal() {
-    let meshes = meshes_or_refusals(&Method::volume(), 60, 12);
+    let meshes = meshes_or_refusals(&Method::volume(), MeshKind::Delaunay, 60, 12);
     assert!(meshes > 30, "{meshes}");
+}
+
+#[test]
+fn any_image_ends_in_voronoi_cells_or_a_clear_refusal() {
+    let meshes = meshes_or_refusals(&Method::flat(), MeshKind::Voronoi, 60, 30);
+    assert!(meshes > 25, "{meshes}");
+    let meshes = meshes_or_refusals(&Method::volume(), MeshKind::Voronoi, 30, 10);
+    assert!(meshes > 12, "{meshes}");
 }
 
 #[test]

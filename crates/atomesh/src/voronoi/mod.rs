@@ -41,8 +41,8 @@ pub use poly_mesh::{PolyMesh, side_name};
 pub use report::PolyReport;
 pub use validate::PolyFault;
 
-use crate::geometry::{Bounds, Point};
-use crate::mesh::{ConnectError, Delaunay};
+use crate::geometry::{Bounds, Point, distance_squared};
+use crate::mesh::{ConnectError, Delaunay, Mesh};
 use crate::watch::{Cancelled, Phase, Watch, check};
 
 /// The tolerance as a share of the mean distance of sites.
@@ -143,6 +143,26 @@ pub fn voronoi<const D: usize>(
     let mesh = tidy::tidy(cut, sites, &place)?;
     mesh.check_cells()?;
     Ok(mesh)
+}
+
+/// The points of a Delaunay mesh that are fit for sites in a box: of two nearer to each other than
+/// [`LEAST_GAP`] allows, such as atoms drawn to one place by the image alone, the first. Nearest points share
+/// an edge of the mesh, so its edges tell. Cost: O(cells).
+pub fn sites_apart<const D: usize>(mesh: &Mesh<D>, bounds: &Bounds<D>) -> Vec<Point<D>> {
+    let points = mesh.points();
+    // twice the gap: without some sites, the mean distance of the others is a little more
+    let least = 2.0 * LEAST_GAP * mean_distance(bounds, points.len());
+    let mut is_site = vec![true; points.len()];
+    for cell in mesh.cells() {
+        for (k, &a) in cell.iter().enumerate() {
+            for &b in &cell[..k] {
+                if distance_squared(&points[a as usize], &points[b as usize]) < least * least {
+                    is_site[a.max(b) as usize] = false;
+                }
+            }
+        }
+    }
+    points.iter().zip(is_site).filter(|(_, is_site)| *is_site).map(|(p, _)| *p).collect()
 }
 
 /// (V/n)^(1/D), the mean distance of n sites.
