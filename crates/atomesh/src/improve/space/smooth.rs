@@ -66,7 +66,7 @@ pub(super) fn facing(patch: &Patch, cell: u32, point: u32) -> [Point<3>; 3] {
         patch.points[corner as usize]
     });
     // three exchanges take the point to the end; they and an odd place make it an even number
-    if k % 2 == 0 { [q, p, r] } else { [p, q, r] }
+    if k.is_multiple_of(2) { [q, p, r] } else { [p, q, r] }
 }
 
 /// The greatest cosine of the cells over the facets, or some cosine of `enough` or more.
