@@ -21,6 +21,8 @@ mod ring;
 mod shape;
 mod smooth;
 
+#[cfg(test)]
+mod tests;
 mod valley;
 
 use super::{Align, ImproveError, ImproveOptions, ImproveReport, Improver};
