@@ -22,7 +22,7 @@ fn share(mesh: &Mesh<3>, center: &[f64; 3], radius: f64) -> f64 {
 }
 
 #[test]
-fn the_volume_in_a_sphere_is_nearer_to_the_truth_than_with_atoms_on_it() {
+fn the_volume_in_a_sphere_is_far_nearer_to_the_truth_than_with_corners_on_it() {
     let drawn = synthesize(Scene::Sphere, &SynthOptions::new([80; 3])).unwrap();
     let Geometry::Sphere { center, radius } = drawn.truth.features[0].geometry else {
         panic!("a sphere is a sphere");
@@ -42,10 +42,10 @@ fn the_volume_in_a_sphere_is_nearer_to_the_truth_than_with_atoms_on_it() {
     // triangles of edges d with corners on the sphere lie d²/8R inside it on average: 3 d²/8R² of the volume
     let chord = 0.375 * (size / radius).powi(2);
     let full = meshed(Align::Full);
-    let off = meshed(Align::Off);
     let error = (share(full.mesh(), &center, radius) - 1.0).abs();
-    let error_off = (share(off.mesh(), &center, radius) - 1.0).abs();
-    assert!(error < 0.6 * chord && error < 0.6 * error_off, "{error} {error_off} {chord}");
+    assert!(error < 0.3 * chord, "{error} {chord}");
+    let off = meshed(Align::Off);
+    assert!(off.improve_report().is_none() && off.mesh() != full.mesh());
     let report = full.improve_report().unwrap();
     assert!(report.floor_held && report.angle_after >= 15.0, "{report:?}");
     assert_eq!(full.mesh().validate(), Ok(()));
