@@ -1,6 +1,6 @@
 //! Taking points away where they crowd, and adding points where they are missing.
 //!
-//! An image pulls more atoms onto some features than edges of length d need, and leaves gaps beside. A point
+//! An image pulls more atoms onto some features than edges of length d need, and leaves thin cells beside. A point
 //! goes if its star costs less with one of its near neighbours in its place; a long edge gets a point near its
 //! middle if the four cells around that cost less than the two had. Only what features or the floor
 //! have reached is looked at.
