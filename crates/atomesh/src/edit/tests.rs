@@ -150,6 +150,6 @@ fn edits_that_cannot_be_are_refused_by_name() {
     assert_eq!(editor.remove(inner), Err(EditError::NoAtom { atom: inner }));
     let again = editor.add(at).unwrap();
     assert_ne!(again, inner, "names are not used again");
-    editor.move_to(again, [0.0, at[1]]).unwrap();
+    editor.move_to(again, [0.0, 7.3]).unwrap();
     assert_eq!(editor.move_to(again, at), Err(EditError::Held { atom: again, axis: 0 }));
 }
