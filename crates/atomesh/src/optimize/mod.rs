@@ -276,10 +276,8 @@ impl<'r, E: Engine<D>, const D: usize> Run<'r, E, D> {
         let mut energy = self.energy.evaluate_at(&x);
         // d and β were read where atoms had been: read where they are, the start may be the better one
         if energy.total() > self.stage.energy_first {
-            eprintln!("DEBUG best {:?} first {}", energy, self.stage.energy_first);
             x = start;
             energy = self.energy.evaluate_at(&x);
-            eprintln!("DEBUG start {:?} again {:?}", energy, self.energy.evaluate_at(&x));
         }
         self.stage.energy_last = energy.total();
         self.report.finish_stage(self.stage, energy, self.minimizer.evaluations() + 1);

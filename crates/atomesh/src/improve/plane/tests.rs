@@ -344,10 +344,11 @@ fn crowds_are_thinned_out_and_gaps_are_filled() {
     assert!(report.removed > near.len() / 2 && report.floor_held, "{report:?}");
     assert_eq!(improved.points().len() + report.removed, crowded.points().len() + report.added);
 
-    // rows of points half of d apart, and a gap of two and a half of d between them: thin cells
+    // no points but those of the box's sides near the valley: what runs along it has to be made
+    let sides = scene.bounds().extent();
+    let on_side = |p: &Point<2>| (0..2).any(|k| p[k] == 0.0 || p[k] == sides[k]);
     let mut gap: Vec<Point<2>> = mesh.points().to_vec();
-    gap.retain(|p| p[1] < 16.0 || p[1] > 40.0);
-    gap.extend((1..24).flat_map(|i| [18.0, 38.0].map(|y| [4.0 * f64::from(i), y])));
+    gap.retain(|p| on_side(p) || scene.line.off(p).abs() > 11.0);
     let (gap, freedom) = scene.connected(&gap);
     let (improved, report) = scene.improve(&gap, &freedom, Align::Full);
     assert!(report.added > 0 && report.floor_held, "{report:?}");

@@ -16,8 +16,10 @@ pub(super) const STIFFNESS: f64 = 0.08;
 const GAIN: f64 = 1e-3;
 /// A valley crosses an edge where it is deeper than at both ends by this.
 const DEEPER: f64 = 0.05;
-/// Where on an edge valleys are looked for.
-const SHARES: [f64; 3] = [0.2, 0.5, 0.8];
+/// Where on an edge valleys are looked for, beside its middle.
+const SHARES: [f64; 2] = [0.2, 0.8];
+/// Where an edge is no deeper than this at its ends and middle, no valley is near.
+const NOTHING: f64 = 0.02;
 /// A point this deep, between the least and the greatest depth around, may be a corner of a facet in the valley.
 pub(super) const NEAR: f64 = 0.2;
 
@@ -80,8 +82,12 @@ impl<'a> Aligner<'a> {
         let mut edges = Vec::new();
         patch.each_edge(open, |patch, cell, a, b| {
             let ends = self.depths[a as usize].max(self.depths[b as usize]);
-            let depth = SHARES.map(|share| self.on_way(patch, a, b, share)).into_iter();
-            let depth = depth.fold(0.0, f64::max);
+            let middle = self.on_way(patch, a, b, 0.5);
+            if ends.max(middle) < NOTHING {
+                return; // far from every valley
+            }
+            let depth =
+                SHARES.iter().fold(middle, |depth, &s| depth.max(self.on_way(patch, a, b, s)));
             if depth > (ends + DEEPER).max(LEAST_DEPTH) {
                 edges.push((cell, a, b, depth));
             }

@@ -105,12 +105,13 @@ fn improve_parts(
         check(watch, Phase::Improve, pass as f64 / CUTS.len() as f64, None)?;
         let divided = whole.divide(cut, pending.as_deref());
         let valences = whole.valences();
-        let improved = |cells: &Vec<u32>| {
-            let mut part = whole.part(cells, &valences, pending.as_deref());
+        let improved = |local: &mut Vec<u32>, cells: &Vec<u32>| {
+            let mut part = whole.part(cells, &valences, pending.as_deref(), local);
             let effort = work.improve(&mut part);
             (part, effort)
         };
-        let done: Vec<(Part, Effort)> = divided.par_iter().map(improved).collect();
+        let local = || vec![patch::NONE; whole.points.len()];
+        let done: Vec<(Part, Effort)> = divided.par_iter().map_init(local, improved).collect();
         let mut held = vec![false; whole.points.len()];
         for (part, effort) in &done {
             report.swaps += effort.swaps;

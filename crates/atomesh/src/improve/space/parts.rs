@@ -7,7 +7,6 @@
 
 use super::patch::{NONE, Patch};
 use crate::geometry::{Bounds, Point};
-use std::collections::HashMap;
 
 /// The points of a part, about: enough that few are held, few enough for all cores and for a cache. Tests cut small meshes too.
 const PART: usize = if cfg!(test) { 60 } else { 12_000 };
@@ -100,20 +99,29 @@ impl Whole {
         valences
     }
 
-    /// The part made of some cells. A point with fewer cells here than `valences` says is held.
-    pub fn part(&self, cells: &[u32], valences: &[u32], pending: Option<&[bool]>) -> Part {
-        let mut local: HashMap<u32, u32> = HashMap::with_capacity(cells.len() / 4);
+    /// The part made of some cells. A point with fewer cells here than `valences` says is held. `local` has
+    /// [`NONE`] for every point, before and after.
+    pub fn part(
+        &self,
+        cells: &[u32],
+        valences: &[u32],
+        pending: Option<&[bool]>,
+        local: &mut [u32],
+    ) -> Part {
         let mut points = Vec::new();
         let corners: Vec<[u32; 4]> = (cells.iter())
             .map(|&cell| {
                 self.corners[cell as usize].map(|corner| {
-                    *local.entry(corner).or_insert_with(|| {
+                    let number = &mut local[corner as usize];
+                    if *number == NONE {
+                        *number = points.len() as u32;
                         points.push(corner);
-                        points.len() as u32 - 1
-                    })
+                    }
+                    *number
                 })
             })
             .collect();
+        points.iter().for_each(|&point| local[point as usize] = NONE);
         let mut missing: Vec<u32> = points.iter().map(|&p| valences[p as usize]).collect();
         corners.iter().flatten().for_each(|&c| missing[c as usize] -= 1);
         let mut freedom: Vec<u8> = points.iter().map(|&p| self.freedom[p as usize]).collect();
