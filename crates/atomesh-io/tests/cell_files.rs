@@ -30,7 +30,7 @@ fn crystal() -> PolyMesh<3> {
 fn flat() -> PolyMesh<2> {
     let bounds = Bounds { min: [0.0; 2], max: [4.0, 3.0] };
     let sites: Vec<Point<2>> = (0..40)
-        .map(|n| f64::from(n))
+        .map(f64::from)
         .map(|n| [4.0 * (n * 0.754_877).fract(), 3.0 * (n * 0.569_84).fract()])
         .collect();
     voronoi(&Delaunay::<2>::new(), &sites, bounds, &mut Silent).unwrap()

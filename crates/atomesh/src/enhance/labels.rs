@@ -161,7 +161,7 @@ mod tests {
         for (x, b) in valley[..60].iter().enumerate() {
             // the share of the left label is half of erfc(s / σ√2), summed over samples
             let share = |s: f64| {
-                (-20..=20).map(|j| f64::from(j)).fold((0.0, 0.0), |(part, all), t| {
+                (-20..=20).map(f64::from).fold((0.0, 0.0), |(part, all), t| {
                     let w = (-0.5 * (t / sigma).powi(2)).exp();
                     (if t > s { part + w } else { part }, all + w)
                 })

@@ -42,7 +42,7 @@ fn a_linear_image_is_carried_exactly_by_linear_cells() {
 fn means_of_cells_leave_the_deviation_within_them() {
     // stripes of two columns, cells of whole squares of 8: each triangle half of either, nearly
     let (frame, samples) =
-        samples([17, 17], |p| if (p[0] / 2.0) as usize % 2 == 0 { 1.0 } else { 3.0 });
+        samples([17, 17], |p| if ((p[0] / 2.0) as usize).is_multiple_of(2) { 1.0 } else { 3.0 });
     let report = fidelity(&squares(2, 8.0), (&frame, &samples), &mut Silent).unwrap();
     assert!((report.deviation - 1.0).abs() < 0.01, "{report:?}");
     assert!((report.constant_rms - 1.0).abs() < 0.02 && report.linear_rms < report.deviation);

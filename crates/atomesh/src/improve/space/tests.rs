@@ -33,7 +33,7 @@ fn mesh(inside: &[Point<3>]) -> Mesh<3> {
     for p in inside {
         points.push(p.map(|x| if x < 1.0 { 0.0 } else { x.min(SIDE + 1.0) }.min(SIDE)));
     }
-    points.sort_by(|a, b| crate::geometry::lexicographic(a, b));
+    points.sort_by(crate::geometry::lexicographic);
     points.dedup();
     Delaunay::<3>::new().connect(&points, &mut Silent).unwrap()
 }
