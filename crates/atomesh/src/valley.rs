@@ -11,6 +11,7 @@
 //!
 //! Cost: O(σ) per sample; derivatives are made one at a time and kept at deep samples only.
 
+use crate::geometry::Sets;
 use crate::geometry::linear::{Matrix, largest_eigenpair};
 use crate::geometry::{Point, dot};
 use crate::image::gaussian_derivative_into;
@@ -160,10 +161,10 @@ fn are_in_large_groups<const D: usize>(
     least: f64,
 ) -> Vec<bool> {
     let mut slots = vec![NONE; shape.iter().product()];
-    let mut groups = Groups { parents: Vec::with_capacity(bottoms.len()) };
+    let mut groups = Sets::with_capacity(bottoms.len());
     for (slot, bottom) in bottoms.iter().enumerate() {
         let slot = slot as u32;
-        groups.parents.push(slot);
+        groups.push();
         slots[bottom.index] = slot;
         let sample = coordinates(bottom.index, shape);
         // neighbours that come later are met from their own side
@@ -176,10 +177,9 @@ fn are_in_large_groups<const D: usize>(
         }
     }
     let mut sizes = vec![0u32; bottoms.len()];
-    let roots: Vec<usize> =
-        (0..bottoms.len()).map(|slot| groups.root(slot as u32) as usize).collect();
-    roots.iter().for_each(|&root| sizes[root] += 1);
-    roots.iter().map(|&root| f64::from(sizes[root]) >= least).collect()
+    let roots = groups.roots();
+    roots.iter().for_each(|&root| sizes[root as usize] += 1);
+    roots.iter().map(|&root| f64::from(sizes[root as usize]) >= least).collect()
 }
 
 /// The index of the neighbour `code`, whose digits to base 3 are the steps along the axes plus 1;
@@ -197,29 +197,6 @@ fn neighbour<const D: usize>(
         code /= 3;
     }
     Some(index)
-}
-
-/// Disjoint groups of slots: each points to a member of its group with a lower slot, or to itself.
-struct Groups {
-    parents: Vec<u32>,
-}
-
-impl Groups {
-    /// The first member of the slot's group; shortens the way there.
-    fn root(&mut self, mut slot: u32) -> u32 {
-        while self.parents[slot as usize] != slot {
-            let above = self.parents[self.parents[slot as usize] as usize];
-            self.parents[slot as usize] = above;
-            slot = above;
-        }
-        slot
-    }
-
-    /// Makes the groups of two slots one.
-    fn join(&mut self, a: u32, b: u32) {
-        let (a, b) = (self.root(a), self.root(b));
-        self.parents[a.max(b) as usize] = a.min(b);
-    }
 }
 
 #[cfg(test)]

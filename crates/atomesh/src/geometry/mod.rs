@@ -10,11 +10,13 @@ pub(crate) mod linear;
 mod compact;
 mod order;
 mod predicates;
+mod sets;
 mod simplex;
 pub use bounds::Bounds;
 pub use compact::{BLOCK, compact_order};
 pub(crate) use order::shares;
 pub use order::{hilbert_order, lexicographic};
+pub(crate) use sets::Sets;
 pub use simplex::Simplex;
 
 /// A point, or a vector, in `D` dimensions: x, y (and z).
@@ -34,6 +36,12 @@ pub fn dot<const D: usize>(a: &Point<D>, b: &Point<D>) -> f64 {
         sum += a[k] * b[k];
     }
     sum
+}
+
+/// The vector product.
+#[inline(always)]
+pub(crate) fn cross(a: &Point<3>, b: &Point<3>) -> Point<3> {
+    [a[1] * b[2] - a[2] * b[1], a[2] * b[0] - a[0] * b[2], a[0] * b[1] - a[1] * b[0]]
 }
 
 /// The squared Euclidean distance of two points.

@@ -260,6 +260,7 @@ impl EdgeLengths {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::geometry::cross;
     use crate::watch::{Phase, Silent};
     use proptest::prelude::*;
     use std::ops::ControlFlow;
@@ -276,10 +277,6 @@ mod tests {
         };
         let least = angle(a, b, c).min(angle(b, a, c)).min(angle(c, a, b));
         (2.0 * (area / s) / (a * b * c / (4.0 * area)), least)
-    }
-
-    fn cross(u: &Point<3>, v: &Point<3>) -> Point<3> {
-        [u[1] * v[2] - u[2] * v[1], u[2] * v[0] - u[0] * v[2], u[0] * v[1] - u[1] * v[0]]
     }
 
     /// The same of a tetrahedron from cross products and the product of opposite edges.

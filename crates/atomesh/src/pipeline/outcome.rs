@@ -98,11 +98,6 @@ impl<const D: usize> Outcome<D> {
         Ok(find_features(world, &field, options)?)
     }
 
-    /// The sides of the box as tags of [`Outcome::world_mesh`].
-    pub fn sides(&self) -> Tags<D> {
-        sides(&self.mesh, &self.potential.grid().bounds(), self.frame.is_mirrored())
-    }
-
     /// The Voronoi cells around the mesh's points, in lattice coordinates, if they were asked for.
     pub fn cells(&self) -> Option<&PolyMesh<D>> {
         self.cells.as_ref()

@@ -1,5 +1,6 @@
 //! The parts into which facets cut a mesh.
 
+use crate::geometry::Sets;
 use crate::mesh::Mesh;
 
 /// For each cell the part that it belongs to, numbered from 1 in the order of their first cells: two cells are
@@ -19,44 +20,28 @@ pub fn components<const D: usize>(mesh: &Mesh<D>, walls: &[[u32; D]]) -> Vec<i32
     let mut walls: Vec<[u32; D]> = walls.to_vec();
     walls.iter_mut().for_each(|wall| wall.sort_unstable());
     walls.sort_unstable();
-    let mut root: Vec<u32> = (0..mesh.cell_count() as u32).collect();
+    let mut parts = Sets::new(mesh.cell_count());
     for facet in mesh.facets() {
         if let Some(other) = facet.neighbour
             && walls.binary_search(&facet.corners).is_err()
         {
-            join(&mut root, facet.cell, other);
+            parts.join(facet.cell, other);
         }
     }
-    numbered(&mut root)
-}
-
-/// Makes two sets one, under the lower root.
-pub(super) fn join(root: &mut [u32], a: u32, b: u32) {
-    let (a, b) = (find(root, a), find(root, b));
-    root[a.max(b) as usize] = a.min(b);
-}
-
-/// The root of a set; shortens the way there.
-pub(super) fn find(root: &mut [u32], mut cell: u32) -> u32 {
-    while root[cell as usize] != cell {
-        root[cell as usize] = root[root[cell as usize] as usize];
-        cell = root[cell as usize];
-    }
-    cell
+    numbered(&parts.roots())
 }
 
 /// The sets' numbers, from 1 in the order of their roots.
-pub(super) fn numbered(root: &mut [u32]) -> Vec<i32> {
-    let mut number = vec![0; root.len()];
+fn numbered(roots: &[u32]) -> Vec<i32> {
+    let mut number = vec![0; roots.len()];
     let mut count = 0;
-    for cell in 0..root.len() {
+    for (cell, &root) in roots.iter().enumerate() {
         // the root of a set is its lowest cell, and so numbered before
-        let at = find(root, cell as u32) as usize;
-        if at == cell {
+        if root as usize == cell {
             count += 1;
             number[cell] = count;
         } else {
-            number[cell] = number[at];
+            number[cell] = number[root as usize];
         }
     }
     number

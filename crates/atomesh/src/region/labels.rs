@@ -4,12 +4,11 @@
 
 use rayon::prelude::*;
 
-use crate::geometry::Point;
+use crate::geometry::{Point, Sets};
 use crate::image::{Grid, Samples};
 use crate::mesh::Mesh;
 
 use super::RegionError;
-use super::components::{find, join};
 
 /// The labels of an image's samples.
 ///
@@ -102,13 +101,13 @@ pub fn islands<const D: usize>(mesh: &Mesh<D>, labels: &mut [i32], least: usize)
     let facets = mesh.facets();
     let pairs: Vec<(u32, u32)> =
         facets.iter().filter_map(|f| f.neighbour.map(|other| (f.cell, other))).collect();
-    let mut root: Vec<u32> = (0..labels.len() as u32).collect();
+    let mut groups = Sets::new(labels.len());
     for &(a, b) in &pairs {
         if labels[a as usize] == labels[b as usize] {
-            join(&mut root, a, b);
+            groups.join(a, b);
         }
     }
-    let roots: Vec<u32> = (0..labels.len() as u32).map(|cell| find(&mut root, cell)).collect();
+    let roots = groups.roots();
     let mut sizes = vec![0_usize; labels.len()];
     roots.iter().for_each(|&r| sizes[r as usize] += 1);
     // the island, a label beside it: once for each facet

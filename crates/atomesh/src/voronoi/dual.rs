@@ -4,7 +4,7 @@ use rayon::prelude::*;
 
 use super::VoronoiError;
 use crate::geometry::linear::solve;
-use crate::geometry::{Bounds, Point, Simplex, difference, distance_squared, dot};
+use crate::geometry::{Bounds, Point, Sets, Simplex, difference, distance_squared, dot};
 use crate::mesh::{CellsOfPoints, Delaunay, Mesh};
 use crate::watch::Watch;
 
@@ -339,27 +339,4 @@ fn join(blocks: Vec<Block>, vertex_of: &[u32]) -> Loops {
         }
     }
     loops
-}
-
-/// Disjoint sets of numbers; the least of a set is its root.
-pub(super) struct Sets(Vec<u32>);
-
-impl Sets {
-    pub fn new(count: usize) -> Self {
-        Self((0..count as u32).collect())
-    }
-
-    pub fn root(&mut self, mut i: u32) -> u32 {
-        while self.0[i as usize] != i {
-            let above = self.0[self.0[i as usize] as usize];
-            self.0[i as usize] = above;
-            i = above;
-        }
-        i
-    }
-
-    pub fn join(&mut self, a: u32, b: u32) {
-        let (a, b) = (self.root(a), self.root(b));
-        self.0[a.max(b) as usize] = a.min(b);
-    }
 }

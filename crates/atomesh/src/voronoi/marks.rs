@@ -2,9 +2,8 @@
 
 use rayon::prelude::*;
 
-use super::dual::Sets;
 use super::poly_mesh::PolyMesh;
-use crate::geometry::{Point, difference, dot};
+use crate::geometry::{Point, Sets, difference, dot};
 use crate::potential::ImagePotential;
 
 /// Faces that one task looks at.

@@ -3,10 +3,10 @@
 use rayon::prelude::*;
 
 use super::clip::{Cut, of_side, side_of};
-use super::dual::{NONE, Place, Sets};
+use super::dual::{NONE, Place};
 use super::poly_mesh::{Parts, PolyMesh};
 use super::validate::PolyFault;
-use crate::geometry::{Point, distance_squared};
+use crate::geometry::{Point, Sets, distance_squared};
 
 /// Loops that one task looks at.
 const BLOCK: usize = 1 << 12;

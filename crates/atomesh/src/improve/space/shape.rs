@@ -4,7 +4,7 @@
 //! circumradius follow from them without a matrix or an arc cosine. [`crate::measure`] computes the same more
 //! slowly for reports; a test compares them.
 
-use crate::geometry::{Point, difference, dot};
+use crate::geometry::{Point, cross, difference, dot};
 
 /// The shape of a tetrahedron.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -23,12 +23,6 @@ pub(super) const UPSIDE_DOWN: f64 = 2.0;
 /// are rounded by half an ulp each, products and sums some ten times more; 10⁻¹³ is a hundred times as much.
 /// A determinant above it has the sign of the exact one.
 const ROUNDING: f64 = 1e-13;
-
-/// The vector product.
-#[inline(always)]
-pub(super) fn cross(a: &Point<3>, b: &Point<3>) -> Point<3> {
-    [a[1] * b[2] - a[2] * b[1], a[2] * b[0] - a[0] * b[2], a[0] * b[1] - a[1] * b[0]]
-}
 
 /// The shape of the tetrahedron with these corners.
 #[inline(always)]

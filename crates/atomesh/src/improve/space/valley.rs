@@ -1,7 +1,6 @@
 //! The image along facets: the mean of b over a facet, and how far from it the valley's bottom is.
 
-use super::shape::cross;
-use crate::geometry::{Point, difference, dot};
+use crate::geometry::{Point, cross, difference, dot};
 use crate::potential::ImagePotential;
 
 /// b between samples, linear along each axis whatever the atoms felt: only its value is wanted, often.

@@ -7,7 +7,7 @@
 
 use super::Triangulation;
 use super::storage::Tetrahedron;
-use crate::geometry::{Bounds, Point, difference, dot};
+use crate::geometry::{Bounds, Point, cross, difference, dot};
 
 /// Half a unit in the last place of 1.
 const ROUNDING: f64 = f64::EPSILON / 2.0;
@@ -83,13 +83,6 @@ impl Ball {
         });
         dot(&gap, &gap).sqrt() > self.radius
     }
-}
-
-fn cross(u: &Point<3>, v: &Point<3>) -> Point<3> {
-    std::array::from_fn(|k| {
-        let (i, j) = ((k + 1) % 3, (k + 2) % 3);
-        u[i] * v[j] - u[j] * v[i]
-    })
 }
 
 #[cfg(test)]
