@@ -19,7 +19,7 @@ use rand_pcg::Pcg64;
 use crate::distance::NominalDistance;
 use crate::image::gaussian;
 use crate::lattice::Lattice;
-use crate::minimize::{Lbfgs, LbfgsOptions, Step};
+use crate::minimize::{Lbfgs, LbfgsOptions, Objective, Step};
 use crate::potential::{Engine, ImagePotential, ImageWeight, PairsEngine, SampledEngine};
 use crate::watch::{Cancelled, Phase, Watch, check};
 
@@ -250,11 +250,9 @@ impl<'r, E: Engine<D>, const D: usize> Run<'r, E, D> {
 
     /// The outer loop.
     fn finish(mut self, watch: &mut dyn Watch) -> Result<Lattice<D>, OptimizeError> {
-        self.minimizer.restart(&mut self.energy);
-        self.note_start();
+        let start = self.begin();
         let mut random = Pcg64::seed_from_u64(self.options.seed);
-        let start = self.minimizer.x().to_vec();
-        let mut best = (self.minimizer.value(), start.clone());
+        let mut best = (self.minimizer.value(), self.minimizer.x().to_vec());
         self.stage.stop = Stop::OuterLimit;
         for outer in 0..self.options.outer_limit.max(1) {
             let done = outer as f64 / self.options.outer_limit.max(1) as f64;
@@ -284,8 +282,19 @@ impl<'r, E: Engine<D>, const D: usize> Run<'r, E, D> {
         Ok(self.energy.into_lattice(&x))
     }
 
-    fn note_start(&mut self) {
+    /// Evaluates the energy where the atoms start, and says where that is: those that were nearer to a side
+    /// than the margin have been moved.
+    fn begin(&mut self) -> Vec<f64> {
+        let given = self.minimizer.x().to_vec();
+        self.minimizer.restart(&mut self.energy);
         self.stage.energy_first = self.minimizer.value();
+        let start = self.minimizer.x().to_vec();
+        if start != given {
+            // d, β and who is near whom were read before they were moved
+            self.stage.energy_first = self.energy.evaluate_at(&start).total();
+            self.minimizer.restart(&mut self.energy);
+        }
+        start
     }
 
     /// Moves each free atom by at most `perturbation` nominal distances, at random.
@@ -301,6 +310,7 @@ impl<'r, E: Engine<D>, const D: usize> Run<'r, E, D> {
             }
         }
         self.energy.hold(self.minimizer.x_mut());
+        self.energy.confine(self.minimizer.x_mut()); // d, β and lists are for where they may be
         self.energy.prepare(self.minimizer.x());
         self.minimizer.restart(&mut self.energy);
     }

@@ -6,7 +6,6 @@ use super::*;
 use crate::geometry::{Point, distance_squared};
 use crate::image::Grid;
 use crate::lattice::{Crystal, GrowOptions, ScatterOptions, Scatterer, grow, scatter};
-use crate::minimize::Objective;
 use crate::potential::{Interpolation, direct_energy};
 use crate::watch::Silent;
 
@@ -122,6 +121,24 @@ fn energy_never_ends_above_its_start() {
             }
         }
     }
+}
+
+/// d and β were once read before atoms near a side were moved to the margin, and the first energy, by which the
+/// end is judged, was that of no place.
+#[test]
+fn the_first_energy_is_that_of_the_place_where_atoms_start() {
+    let scene = Scene::new([60, 40], valley(1, 18.7, 1.0), 0.0, 5.0).varying(|p| 3.0 + 0.1 * p[0]);
+    let options = OptimizeOptions { margin: 0.8, ..Default::default() }; // more than a crystal keeps
+    let lattice = scene.grown(&Crystal::hexagonal());
+    let given = lattice.atoms().to_vec();
+    let engine = PairsEngine::new(&scene.potential, &scene.weight, &scene.distance);
+    let mut report = OptimizeReport::new(EngineKind::Pairs);
+    let mut run = Run::new(lattice.clone(), engine, &options, 0.0, &mut report);
+    let start = run.begin();
+    assert_ne!(given.as_flattened(), start, "no atom was near a side");
+    let there = scene.direct(&lattice.moved_to(start.as_chunks().0.to_vec())).total();
+    // sums of some thousand terms below 1 in another order
+    assert!((run.stage.energy_first - there).abs() < 1e-11, "{} {there}", run.stage.energy_first);
 }
 
 #[test]
