@@ -47,6 +47,7 @@ struct Cli {
 #[derive(Debug, Subcommand)]
 enum Command {
     Mesh(Box<commands::mesh::MeshArgs>),
+    Enhance(Box<commands::enhance::EnhanceArgs>),
     Features(Box<commands::features::FeaturesArgs>),
     Report(Box<commands::report::ReportArgs>),
     Sample(Box<commands::sample::SampleArgs>),
@@ -70,6 +71,7 @@ impl Cli {
         let mut watch = Progress::new(self.verbosity());
         let result = match self.command {
             Command::Mesh(args) => commands::mesh::run(*args, &mut watch),
+            Command::Enhance(args) => commands::enhance::run(&args, &mut watch),
             Command::Features(args) => commands::features::run(&args, &mut watch),
             Command::Report(args) => commands::report::run(&args, &mut watch),
             Command::Sample(args) => commands::sample::run(&args, &mut watch),

@@ -20,7 +20,7 @@ use atomesh_io::mesh::{MeshData, MeshFormat, MeshWriteError, Provenance, write_m
 use crate::dimension::Dimension;
 use crate::failure::Failure;
 use crate::progress::Progress;
-use crate::run_config::{InputOptions, RunConfig};
+use crate::run_config::{Backdrop, InputOptions, RunConfig};
 
 /// Where everything goes, in formats that are known.
 #[derive(Clone, Debug)]
@@ -30,6 +30,7 @@ pub struct Outputs {
     mesh_format: Format,
     connections: Option<ConnectionFiles>,
     picture: Option<(PathBuf, PictureFormat)>,
+    backdrop: Backdrop,
     /// The report.
     pub report: Option<PathBuf>,
     /// The report as a page.
@@ -165,6 +166,7 @@ impl Outputs {
             mesh_format,
             connections,
             picture,
+            backdrop: options.picture_of.unwrap_or_default(),
             report,
             html,
             potential,
@@ -245,6 +247,8 @@ impl Outputs {
         if let (Some((path, format)), Some(image)) = (&self.picture, image) {
             watch.begin(Phase::Draw);
             let style = self.style(outcome);
+            let backdrop = self.backdrop(outcome)?;
+            let image = backdrop.as_ref().unwrap_or(image);
             let picture = match outcome.sample_cells() {
                 Some(cells) => (dimension.draw_cells)(image, &cells, &style),
                 None => (dimension.draw)(image, &outcome.sample_mesh(), &style),
@@ -285,6 +289,18 @@ impl Outputs {
             data = data.with_cell_field("label", labels).map_err(Failure::content)?;
         }
         write_mesh_as(&self.mesh, format, &data, watch).map_err(|e| self.mesh_failure(e))
+    }
+
+    /// What is drawn behind the mesh; `None`: the image.
+    fn backdrop<const D: usize>(&self, outcome: &Outcome<D>) -> Result<Option<Image<D>>, Failure> {
+        let values = match self.backdrop {
+            Backdrop::Image => return Ok(None),
+            Backdrop::Potential => outcome.potential().samples().to_vec(),
+            Backdrop::Distance => outcome.distance_at_samples(),
+            Backdrop::Density => outcome.feature_density(),
+        };
+        let image = Image::new(*outcome.frame(), Samples::F32(values));
+        image.map(Some).map_err(Failure::content)
     }
 
     /// Writes Voronoi cells and their connections.
@@ -368,12 +384,13 @@ fn is_page(path: &Path) -> bool {
     path.extension().is_some_and(|e| e.eq_ignore_ascii_case("html"))
 }
 
-fn unknown_ending(path: &Path, known: &str) -> Failure {
+/// A failure that names the endings that are known.
+pub fn unknown_ending(path: &Path, known: &str) -> Failure {
     Failure::misuse(format!("the ending says no format; expected one of {known}")).about(path)
 }
 
-/// The formats that hold single precision.
-fn check_potential(path: &Path) -> Result<(), Failure> {
+/// Checks that a file's ending promises a format that holds single precision.
+pub fn check_potential(path: &Path) -> Result<(), Failure> {
     use ImageFormat::{Nifti, NiftiGz, Npy, Raw, Tiff};
     match ImageFormat::from_path(path) {
         Some(Npy | Nifti | NiftiGz | Tiff | Raw) => Ok(()),

@@ -2,7 +2,8 @@
 
 use std::path::PathBuf;
 
-use atomesh::enhance::{EdgeOperator, FeatureOptions, Features};
+use atomesh::distance::GradeBy;
+use atomesh::enhance::{EdgeOperator, FeatureOptions, Mixture};
 use atomesh::image::Units;
 use atomesh::improve::{Align, ImproveOptions};
 use atomesh::optimize::{EngineKind, OptimizeOptions};
@@ -13,7 +14,7 @@ use serde::{Deserialize, Serialize};
 use crate::failure::Failure;
 use crate::frame_options::{FrameOptions, axes};
 use crate::section::section;
-use crate::values::{Numbers, SizeValue, named, number_in};
+use crate::values::{Numbers, SizeValue, Text, named, number_in};
 
 /// Stages on smoothed potentials that anyone could want.
 const MOST_STEPS: u64 = 10;
@@ -50,11 +51,10 @@ section! {
 section! {
     /// How the image becomes a potential.
     pub struct PotentialOptions {
-        /// What attracts atoms: dark or bright places, edges, places where labels meet, or nothing.
-        /// Default: dark
-        #[arg(long, value_name = "KIND",
-            value_parser = named::<Features>(&["dark", "bright", "edges", "labels", "none"]))]
-        pub features: Features,
+        /// What attracts atoms: dark or bright places, edges, places where labels meet (labels), or none. Several
+        /// kinds may share a potential, each with its weight: dark:1,edges:0.5. Default: dark
+        #[arg(long, visible_alias = "as", value_name = "KIND[:WEIGHT],...")]
+        pub features: Text<Mixture>,
         /// How edges are found: derivatives of a Gaussian, or the paper's Prewitt differences.
         /// Default: gaussian
         #[arg(long, value_name = "OPERATOR",
@@ -76,10 +76,27 @@ section! {
         #[arg(long, value_name = "SIGMA",
             value_parser = number_in(0.0, f64::MAX, "a length of 0 or more"))]
         pub smooth: f64,
-        /// How the potential is read between samples. Default: spline in 2-D, linear in 3-D
-        #[arg(long, value_name = "KIND",
-            value_parser = named::<Interpolation>(&["nearest", "linear", "spline"]))]
-        pub interpolation: Interpolation,
+    }
+}
+
+impl PotentialOptions {
+    /// What the core takes of them: what is not given, from `basis`.
+    pub fn feature_options(&self, basis: FeatureOptions) -> FeatureOptions {
+        let single = self.features.as_ref().and_then(|mixture| mixture.0.single());
+        FeatureOptions {
+            features: single.unwrap_or(basis.features),
+            edge_operator: self.edge_operator.unwrap_or(basis.edge_operator),
+            edge_scale: self.edge_scale.unwrap_or(basis.edge_scale),
+            smooth: self.smooth.or(basis.smooth),
+            repel: self.repel.unwrap_or(basis.repel),
+            ..basis
+        }
+    }
+
+    /// The kinds of features, if they are more than one of weight 1.
+    pub fn mixture(&self) -> Option<Mixture> {
+        let Text(mixture) = self.features.as_ref()?;
+        mixture.single().is_none().then(|| mixture.clone())
     }
 }
 
@@ -95,6 +112,11 @@ section! {
         /// 6..18. Default: from the size of the image
         #[arg(long, value_name = "D | MIN..MAX", allow_hyphen_values = true)]
         pub size: SizeValue,
+        /// Where --size MIN..MAX is least: where features are dense, where they are narrow or bent (curvature), or
+        /// near them (distance). Default: density
+        #[arg(long, value_name = "WHAT",
+            value_parser = named::<GradeBy>(&["density", "curvature", "distance"]))]
+        pub grade_by: GradeBy,
         /// Weight β of the image against regularity, 0 to 1. Default: 0.45
         #[arg(long, value_name = "BETA", allow_hyphen_values = true,
             value_parser = number_in(0.0, 1.0, "a number from 0 to 1"))]
@@ -128,6 +150,10 @@ section! {
         #[arg(long, value_name = "ENGINE",
             value_parser = named::<EngineKind>(&["pairs", "sampled"]))]
         pub engine: EngineKind,
+        /// How the potential is read between samples. Default: spline in 2-D, linear in 3-D
+        #[arg(long, value_name = "KIND",
+            value_parser = named::<Interpolation>(&["nearest", "linear", "spline"]))]
+        pub interpolation: Interpolation,
         /// Stages on a smoothed potential before the sharp one. Default: 2 in 2-D,
         /// 0 in 3-D and with --mesh voronoi
         #[arg(long, value_name = "COUNT", value_parser = clap::value_parser!(u64).range(0..=MOST_STEPS))]
@@ -179,6 +205,21 @@ section! {
     }
 }
 
+/// What a picture shows behind the mesh.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(rename_all = "lowercase")]
+pub enum Backdrop {
+    /// The image that was meshed.
+    #[default]
+    Image,
+    /// b(x), as the atoms felt it.
+    Potential,
+    /// d(x).
+    Distance,
+    /// How many features there are around.
+    Density,
+}
+
 section! {
     /// The files that are written.
     pub struct OutputOptions {
@@ -206,6 +247,11 @@ section! {
         /// middle
         #[arg(long, value_name = "PICTURE")]
         pub picture: PathBuf,
+        /// What the picture shows behind the mesh: the image, the potential, the nominal distance, or the density of
+        /// features, smoothed by the greatest distance. Needs --picture. Default: image
+        #[arg(long, value_name = "WHAT",
+            value_parser = named::<Backdrop>(&["image", "potential", "distance", "density"]))]
+        pub picture_of: Backdrop,
         /// Figures of the mesh (shape, alignment, fidelity) and of the run, as JSON; as a page if it ends
         /// in .html
         #[arg(long, value_name = "JSON")]
@@ -316,22 +362,23 @@ impl RunConfig {
         let mut defaults = Self {
             lattice: LatticeOptions {
                 mesh: Some(mesh.kind),
+                grade_by: Some(mesh.grade_by),
                 beta: Some(mesh.image_weight),
                 units: Some(mesh.units),
                 spacing_factor: Some(mesh.spacing_factor),
                 ..Default::default()
             },
             features: PotentialOptions {
-                features: Some(features.features),
+                features: Some(Text(features.features.into())),
                 edge_operator: Some(features.edge_operator),
                 edge_scale: Some(features.edge_scale),
                 repel: Some(features.repel),
                 smooth: features.smooth,
-                interpolation: Some(mesh.interpolation),
             },
             regions: RegionOptions { least_island: Some(mesh.least_island as u64) },
             optimize: OptimizerOptions {
                 engine: Some(moves.engine),
+                interpolation: Some(mesh.interpolation),
                 smoothing_steps: Some(moves.smoothing_steps as u64),
                 tolerance: Some(moves.tolerance),
                 inner_limit: Some(moves.inner_limit as u64),
@@ -347,8 +394,7 @@ impl RunConfig {
         };
         if self.input.potential.is_some() {
             // the options of features have no part in the run
-            let interpolation = defaults.features.interpolation;
-            defaults.features = PotentialOptions { interpolation, ..Default::default() };
+            defaults.features = PotentialOptions::default();
         }
         self.or(defaults)
     }
@@ -380,20 +426,14 @@ impl RunConfig {
         };
         // below the bound of the greater dimension, as long as the image is not known
         improve.validate(3).map_err(Failure::misuse)?;
-        let basis = default.features;
         Ok(MeshOptions {
-            features: FeatureOptions {
-                features: features.features.unwrap_or(basis.features),
-                edge_operator: features.edge_operator.unwrap_or(basis.edge_operator),
-                edge_scale: features.edge_scale.unwrap_or(basis.edge_scale),
-                smooth: features.smooth.or(basis.smooth),
-                repel: features.repel.unwrap_or(basis.repel),
-                ..basis
-            },
-            interpolation: features.interpolation.unwrap_or(default.interpolation),
+            features: features.feature_options(default.features),
+            mixture: features.mixture(),
+            interpolation: moves.interpolation.unwrap_or(default.interpolation),
             kind: default.kind,
             units: lattice.units.unwrap_or(default.units),
             size: lattice.size.map_or(Size::Default, |s| s.0),
+            grade_by: lattice.grade_by.unwrap_or(default.grade_by),
             image_weight: lattice.beta.unwrap_or(default.image_weight),
             lattice: lattice.lattice.unwrap_or(default.lattice),
             spacing_factor: lattice.spacing_factor.unwrap_or(default.spacing_factor),

@@ -27,6 +27,7 @@ use crate::outputs::{Outputs, write_bytes};
 use crate::progress::{Progress, Verbosity, writing};
 use crate::report_page::{PageParts, option_rows, write_page};
 use crate::run_config::RunConfig;
+use crate::values::Text;
 
 /// Turn an image into a mesh that follows it
 ///
@@ -89,7 +90,8 @@ pub fn run(args: MeshArgs, watch: &mut Progress) -> Result<String, Failure> {
     }
     if run.input.image.is_none() && run.input.potential.is_none() && run.input.labels.is_some() {
         // labels alone: they are the image, and where they meet the features
-        run.features.features = run.features.features.or(Some(Features::Labels));
+        let labels = || Text(Features::Labels.into());
+        run.features.features.get_or_insert_with(labels);
     }
     run.check()?;
     let shown = shown_path(&run)?.to_path_buf();

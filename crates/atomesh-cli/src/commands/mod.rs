@@ -2,6 +2,7 @@
 
 pub mod check;
 pub mod completions;
+pub mod enhance;
 pub mod features;
 pub mod info;
 pub mod man;

@@ -6,16 +6,17 @@
 //! large. It never falls below its own minimum. Lengths are in lattice units.
 
 mod coarse;
+mod grading;
 mod limit;
 mod tidy;
 
 use crate::geometry::Point;
-use crate::image::{Grid, gaussian};
+use crate::image::Grid;
 use coarse::{Take, coarse_grid, reduce};
 use limit::limit_gradient;
 use rayon::prelude::*;
-use serde::{Deserialize, Serialize};
 
+pub use grading::{GradeBy, Grading, feature_density};
 pub use tidy::default_distance;
 
 /// Greatest slope of d where none is asked for, in lattice units of d per lattice unit of way.
@@ -23,9 +24,6 @@ pub use tidy::default_distance;
 /// Of the order of the paper's Fig. 5 (d from 6 to 18 within some 50 samples); neighbouring edges
 /// then differ by a quarter, which a lattice follows without defects.
 pub const GRADIENT_LIMIT: f64 = 0.25;
-
-/// The share of the image, where features are densest, that gets the least distance of a grading.
-const DENSEST: f64 = 0.2;
 
 /// Why there is no nominal distance.
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]
@@ -83,35 +81,6 @@ pub enum DistanceError {
     },
 }
 
-/// How d follows the density of features in an image.
-#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
-#[serde(deny_unknown_fields, rename_all = "kebab-case")]
-pub struct Grading {
-    /// The distance where features are densest, in lattice units.
-    pub min: f64,
-    /// The distance where there are none.
-    pub max: f64,
-    /// Standard deviation of the smoothing that turns features into their density, in lattice
-    /// units. Default: `max`, so that d changes over a few edges; with it Fig. 1 of the paper gets
-    /// about the distances of its Fig. 5 for 6…18.
-    #[serde(default)]
-    pub smooth: Option<f64>,
-    /// The greatest slope of d. Default [`GRADIENT_LIMIT`].
-    #[serde(default = "default_limit")]
-    pub gradient_limit: f64,
-}
-
-fn default_limit() -> f64 {
-    GRADIENT_LIMIT
-}
-
-impl Grading {
-    /// From `min` to `max`, the rest by default.
-    pub fn new(min: f64, max: f64) -> Self {
-        Self { min, max, smooth: None, gradient_limit: GRADIENT_LIMIT }
-    }
-}
-
 /// The nominal distance d(x) over an image's box, in lattice units.
 #[derive(Clone, Debug, PartialEq)]
 pub struct NominalDistance<const D: usize> {
@@ -144,49 +113,6 @@ impl<const D: usize> NominalDistance<D> {
             greatest: distance,
             greatest_slope: 0.0,
         })
-    }
-
-    /// Small where the image has many features, large where it has few.
-    ///
-    /// |b| is smoothed to a density of features; d falls linearly with it, from `max` where the
-    /// density is least to `min` where it is among the greatest fifth, and its slope is limited.
-    /// Source: "a smoothed, scaled, and biased version of the image" (Hale 2001, Fig. 5).
-    /// Departure: the paper gives neither the smoothing nor the scale. A potential of one density
-    /// everywhere gets `max`.
-    ///
-    /// # Errors
-    /// [`DistanceError::FieldShape`] unless there is one sample of b per sample of the image; for
-    /// the grading [`DistanceError::NotPositive`], [`DistanceError::BelowStep`],
-    /// [`DistanceError::Order`], [`DistanceError::GradientLimit`] and [`DistanceError::Smooth`].
-    pub fn from_potential(
-        grid: &Grid<D>,
-        potential: &[f32],
-        grading: &Grading,
-    ) -> Result<Self, DistanceError> {
-        let Grading { min, max, gradient_limit, .. } = *grading;
-        check_count(grid, potential.len())?;
-        check_length(min)?;
-        check_length(max)?;
-        check_step(grid, min)?;
-        check_limit(gradient_limit)?;
-        if min > max {
-            return Err(DistanceError::Order { min, max });
-        }
-        let smooth = grading.smooth.unwrap_or(max);
-        if !(smooth.is_finite() && smooth >= 0.0) {
-            return Err(DistanceError::Smooth { value: smooth });
-        }
-        let nodes = coarse_grid(grid, 0.5 * min);
-        let mut values = reduce(potential, grid, &nodes, Take::Magnitude);
-        gaussian(&mut values, nodes.shape, nodes.step.map(|step| smooth / step));
-        let (sparse, dense) = density_range(&values);
-        let scale = if dense > sparse { (max - min) / f64::from(dense - sparse) } else { 0.0 };
-        for v in &mut values {
-            let distance = max - f64::from(*v - sparse) * scale;
-            *v = distance.clamp(min, max) as f32;
-        }
-        limit_gradient(&mut values, nodes.shape, nodes.step, gradient_limit);
-        Ok(Self::new(nodes, values, grid))
     }
 
     /// d as the user gives it at every sample, lowered where its slope exceeds `gradient_limit`.
@@ -400,15 +326,6 @@ const BLOCK: usize = 1 << 16;
 /// The weight of node `i` of `n` in the trapezoidal rule.
 fn trapezoid(i: usize, n: usize) -> f64 {
     if n > 1 && (i == 0 || i + 1 == n) { 0.5 } else { 1.0 }
-}
-
-/// The least density of features, and the one that only the densest share of nodes exceeds.
-fn density_range(densities: &[f32]) -> (f32, f32) {
-    let least = densities.iter().copied().fold(f32::INFINITY, f32::min);
-    let mut order = densities.to_vec();
-    let rank = ((1.0 - DENSEST) * (order.len() - 1) as f64) as usize;
-    let (_, &mut dense, _) = order.select_nth_unstable_by(rank, f32::total_cmp);
-    (least, dense)
 }
 
 fn check_count<const D: usize>(grid: &Grid<D>, found: usize) -> Result<(), DistanceError> {

@@ -17,15 +17,18 @@
 //! Cost: a few passes over the samples. Memory: one f32 a sample beside the image.
 
 mod labels;
+mod mixture;
 mod quantile;
 mod scale;
 
 use crate::image::{Grid, Image, Samples, Stencil, Units, gaussian, gaussian_between, magnitude};
 use crate::watch::{Cancelled, Phase, Watch, check};
+pub use mixture::{Mixture, MixtureError, Share, enhance_mixture};
 use quantile::{Order, Ranks};
 use rayon::prelude::*;
 use scale::{Ramp, UnitSamples};
 use serde::{Deserialize, Serialize};
+use std::str::FromStr;
 
 /// Of all samples, the share whose gradient is clipped to −1.
 const CLIPPED_EDGES: f64 = 0.005;
@@ -55,6 +58,33 @@ pub enum Features {
     Labels,
     /// Nothing: b = 0, and the mesh is as regular as it can be.
     None,
+}
+
+impl Features {
+    /// The names of all kinds.
+    pub const NAMES: [&str; 5] = ["dark", "bright", "edges", "labels", "none"];
+
+    const ALL: [Self; Self::NAMES.len()] =
+        [Self::Dark, Self::Bright, Self::Edges, Self::Labels, Self::None];
+
+    /// The name on the command line.
+    pub fn name(self) -> &'static str {
+        match self {
+            Self::Dark => "dark",
+            Self::Bright => "bright",
+            Self::Edges => "edges",
+            Self::Labels => "labels",
+            Self::None => "none",
+        }
+    }
+}
+
+impl FromStr for Features {
+    type Err = ();
+
+    fn from_str(name: &str) -> Result<Self, ()> {
+        Self::ALL.into_iter().find(|features| features.name() == name).ok_or(())
+    }
 }
 
 /// How edges are found.

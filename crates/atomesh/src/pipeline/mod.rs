@@ -178,12 +178,15 @@ fn potential_samples<const D: usize>(
     }
     let smooth = options.features.smooth.or_else(|| width_for_faces(inputs, options));
     let features = FeatureOptions { units: options.units, smooth, ..options.features };
-    let image = match (inputs.labels, features.features) {
+    let image_of = |kind| match (inputs.labels, kind) {
         (Some(labels), Features::Labels) => labels,
         _ => inputs.image,
     };
-    let enhanced = enhance::enhance(image, &features, watch)?;
-    if enhanced.constant && features.features != Features::None {
+    let enhanced = match &options.mixture {
+        Some(mixture) => enhance::enhance_mixture(mixture, &features, image_of, watch)?,
+        None => enhance::enhance(image_of(features.features), &features, watch)?,
+    };
+    if enhanced.constant {
         warnings.push(Warning::Constant);
     }
     Ok(enhanced.values)
@@ -223,7 +226,8 @@ fn nominal_distance<const D: usize>(
         Size::Default => NominalDistance::constant(grid, default_distance(grid))?,
         Size::Constant(d) => NominalDistance::constant(grid, d)?,
         Size::Range { min, max } => {
-            NominalDistance::from_potential(grid, samples, &Grading::new(min, max))?
+            let grading = Grading { by: options.grade_by, ..Grading::new(min, max) };
+            NominalDistance::from_potential(grid, samples, &grading)?
         }
     })
 }

@@ -2,7 +2,8 @@
 
 use serde::{Deserialize, Serialize};
 
-use crate::enhance::FeatureOptions;
+use crate::distance::GradeBy;
+use crate::enhance::{FeatureOptions, Mixture};
 use crate::geometry::Point;
 use crate::image::Units;
 use crate::improve::ImproveOptions;
@@ -18,7 +19,8 @@ pub enum Size {
     Default,
     /// The same everywhere.
     Constant(f64),
-    /// From `min` where features are dense to `max` where there are none (the paper's Fig. 5).
+    /// From `min` where features are dense to `max` where there are none (the paper's Fig. 5), or as
+    /// [`MeshOptions::grade_by`] says.
     Range {
         /// Where features are densest.
         min: f64,
@@ -75,6 +77,8 @@ pub enum MeshKind {
 pub struct MeshOptions<const D: usize> {
     /// How the image becomes a potential; its `units` are overruled by [`MeshOptions::units`].
     pub features: FeatureOptions,
+    /// Several kinds of features with their weights; goes before the one kind in `features`. Default none.
+    pub mixture: Option<Mixture>,
     /// How b is read between samples. Default [`Interpolation::for_dimension`].
     pub interpolation: Interpolation,
     /// What the cells are. Default triangles or tetrahedra.
@@ -83,6 +87,8 @@ pub struct MeshOptions<const D: usize> {
     pub units: Units,
     /// The nominal distance.
     pub size: Size,
+    /// What makes d small where [`Size::Range`] is given. Default: the density of features.
+    pub grade_by: GradeBy,
     /// β, the weight of the image against regularity, in 0…1; equation (4). Default 0.45: "typically, we
     /// choose β ≈ 1/2" (Hale 2001); a little less costs little alignment and keeps cells well shaped. On the
     /// paper's fault image at d = 8 improved meshes have recall 0.93 and mean quality 0.923 with it, 0.92 and
@@ -128,10 +134,12 @@ impl<const D: usize> Default for MeshOptions<D> {
     fn default() -> Self {
         Self {
             features: FeatureOptions::default(),
+            mixture: None,
             interpolation: Interpolation::for_dimension(D),
             kind: MeshKind::default(),
             units: Units::default(),
             size: Size::default(),
+            grade_by: GradeBy::default(),
             image_weight: 0.45,
             lattice: LatticeKind::default(),
             spacing_factor: 0.8,

@@ -1,6 +1,6 @@
 //! What a run gives.
 
-use crate::distance::NominalDistance;
+use crate::distance::{NominalDistance, feature_density};
 use crate::features::{FacetField, FeatureFacetOptions, FeatureSet, find_features};
 use crate::geometry::{Bounds, Point};
 use crate::image::{Frame, Grid, Samples, Units};
@@ -16,6 +16,7 @@ use crate::potential::ImagePotential;
 use crate::region::{Outline, interfaces};
 use crate::voronoi::{FeatureFaces, PolyMesh, PolyReport, feature_faces};
 use crate::watch::Watch;
+use rayon::prelude::*;
 
 use super::error::{PipelineError, Warning};
 
@@ -163,6 +164,34 @@ impl<const D: usize> Outcome<D> {
     /// d(x).
     pub fn distance(&self) -> &NominalDistance<D> {
         &self.distance
+    }
+
+    /// d at the image's samples, x fastest.
+    pub fn distance_at_samples(&self) -> Vec<f32> {
+        let grid = self.potential.grid();
+        let row = grid.shape[0];
+        let mut values = vec![0.0; grid.sample_count()];
+        values.par_chunks_mut(row).enumerate().for_each(|(r, values)| {
+            let mut rest = r;
+            let mut p = [0.0; D];
+            for k in 1..D {
+                p[k] = (rest % grid.shape[k]) as f64 * grid.step[k];
+                rest /= grid.shape[k];
+            }
+            for (i, value) in values.iter_mut().enumerate() {
+                p[0] = i as f64 * grid.step[0];
+                *value = self.distance.at(&p) as f32;
+            }
+        });
+        values
+    }
+
+    /// How many features there are around each of the image's samples, x fastest: |b| smoothed by the greatest
+    /// nominal distance, 0…1.
+    pub fn feature_density(&self) -> Vec<f32> {
+        let smooth = self.distance.greatest();
+        feature_density(self.potential.grid(), self.potential.samples(), smooth)
+            .expect("a potential has a sample for each of its grid, and d is a length")
     }
 
     /// The image's frame.

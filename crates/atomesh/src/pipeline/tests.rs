@@ -4,7 +4,7 @@ use rand::{RngExt, SeedableRng};
 use rand_pcg::Pcg64;
 
 use super::*;
-use crate::distance::DistanceError;
+use crate::distance::{DistanceError, GradeBy};
 use crate::geometry::difference;
 use crate::image::Samples;
 use crate::lattice::LatticeError;
@@ -147,6 +147,7 @@ fn random_options<const D: usize>(random: &mut Pcg64, image: &Image<D>) -> MeshO
             random,
             &[Interpolation::Linear, Interpolation::Spline, Interpolation::Nearest],
         ),
+        mixture: None,
         kind: MeshKind::default(),
         units,
         size: one_of(
@@ -162,6 +163,7 @@ fn random_options<const D: usize>(random: &mut Pcg64, image: &Image<D>) -> MeshO
                 Size::Range { min: 2.0 * d, max: d },
             ],
         ),
+        grade_by: one_of(random, &[GradeBy::Density, GradeBy::Curvature, GradeBy::Distance]),
         image_weight: one_of(random, &[0.0, 0.3, 0.4, 0.5, 0.5, 0.7, 0.9, 1.0, 1.0, 1.1]),
         lattice: one_of(random, &lattices),
         spacing_factor: one_of(random, &[0.8, 0.8, 0.6, 1.0]),

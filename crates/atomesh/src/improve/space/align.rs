@@ -15,7 +15,7 @@ pub(super) const STIFFNESS: f64 = 0.08;
 /// What a swap must gain, so that none goes in circles.
 const GAIN: f64 = 1e-3;
 /// A valley crosses an edge where it is deeper than at both ends by this.
-const DEEPER: f64 = 0.05;
+pub(super) const DEEPER: f64 = 0.05;
 /// Where on an edge valleys are looked for, beside its middle.
 const SHARES: [f64; 2] = [0.2, 0.8];
 /// Where an edge is no deeper than this at its ends and middle, no valley is near.
@@ -97,7 +97,7 @@ impl<'a> Aligner<'a> {
 
     /// The depth at a share of the way from a to b.
     #[inline]
-    fn on_way(&self, patch: &Patch, a: u32, b: u32, share: f64) -> f64 {
+    pub fn on_way(&self, patch: &Patch, a: u32, b: u32, share: f64) -> f64 {
         let (p, q) = (&patch.points[a as usize], &patch.points[b as usize]);
         self.valley.depth(&std::array::from_fn(|k| p[k] + share * (q[k] - p[k])))
     }

@@ -20,6 +20,7 @@ mod patch;
 mod ring;
 mod shape;
 mod smooth;
+mod stray;
 
 #[cfg(test)]
 mod tests;
@@ -89,6 +90,7 @@ impl Improver<3> for Space {
         report.angle_after = angle(worst);
         report.below = below;
         report.floor_held = below == 0;
+        whole.drop_loose_points();
         Ok((Mesh::new(whole.points, whole.corners.into_flattened())?, report))
     }
 }
@@ -148,6 +150,10 @@ impl Work<'_> {
             aligner.moves(patch, &open, &mut effort);
         }
         heal(patch, self.floor, ROUNDS, &mut effort);
+        if self.align == Align::Full {
+            aligner.depths = patch.points.iter().map(|p| valley.depth(p)).collect();
+            aligner.gather_strays(patch, &open, &mut effort);
+        }
         effort
     }
 }
@@ -165,6 +171,23 @@ impl Whole {
         let freedom = freedom.iter().zip(&sides).map(|(f, s)| f & !(s | s >> 3)).collect();
         let corners = corners.chunks_exact(4).map(|c| [c[0], c[1], c[2], c[3]]).collect();
         Self { points, freedom, sides, corners }
+    }
+
+    /// Drops points that no cell has any more.
+    fn drop_loose_points(&mut self) {
+        let mut number = vec![patch::NONE; self.points.len()];
+        self.corners.iter().flatten().for_each(|&c| number[c as usize] = 0);
+        if !number.contains(&patch::NONE) {
+            return;
+        }
+        let mut count = 0;
+        for (number, point) in number.iter_mut().zip(0..).filter(|(n, _)| **n == 0) {
+            self.points[count as usize] = self.points[point];
+            *number = count;
+            count += 1;
+        }
+        self.points.truncate(count as usize);
+        self.corners.iter_mut().flatten().for_each(|c| *c = number[*c as usize]);
     }
 
     /// The greatest cosine of a cell, and how many are above `floor`.

@@ -11,6 +11,7 @@ use crate::geometry::{Bounds, Point};
 pub(super) const NONE: u32 = u32::MAX;
 
 /// Cells, their neighbours and their shapes.
+#[derive(Clone)]
 pub(super) struct Patch {
     pub points: Vec<Point<3>>,
     /// Bit k of a point: it may move along axis k.
@@ -243,6 +244,11 @@ impl Patch {
         for &cell in star {
             self.shapes[cell as usize] = self.shape_of(&self.corners[cell as usize]);
         }
+    }
+
+    /// Forgets a point that no cell has any more.
+    pub fn forget(&mut self, point: u32) {
+        self.cell_of[point as usize] = NONE;
     }
 
     /// The cells that are alive.

@@ -1,0 +1,303 @@
+//! Points that moves have left beside a valley.
+//!
+//! Where a point could come onto the valley only through cells below the floor, neither a swap nor a move alone gains
+//! anything. So a copy of its surroundings is made, and there the point goes to the valley's bottom step by step,
+//! while swaps and moves of points beside the valley mend what becomes too flat; or, where the valley is crowded
+//! already, it is merged with the nearest point in it. What ends with well-shaped cells and with facets that are worth
+//! more takes the place of the original.
+
+use super::align::{Aligner, NEAR};
+use super::heal::{Effort, heal};
+use super::patch::{NONE, Patch};
+use super::smooth::{facing, worst_cosine};
+use super::valley::Contrast;
+use crate::geometry::{Point, distance_squared, dot};
+
+/// A valley that is worth the effort is as deep as this.
+const LEAST_DEPTH: f64 = 0.5;
+/// Of the greatest depth around, the point's own is at most this.
+const BESIDE: f64 = 0.88;
+/// Of so many of its neighbours, and of the bottom beside it, the depth is at least this share of the greatest.
+const SHALLOW: f64 = 0.75;
+const DEEP_NEIGHBOURS: usize = 4;
+/// How far the point is from the bottom at least, and at most, in the length of its edges.
+const STRAY: f64 = 0.08;
+const REACH: f64 = 0.5;
+/// A point in the valley is crowded by one within this share of the length of its edges.
+const CROWDED: f64 = 0.7;
+/// The greatest cosine on the way, that of 2°.
+const FLATTEST: f64 = 0.9994;
+/// The shares of the way that are tried, and how often.
+const SHARES: [f64; 4] = [1.0, 0.6, 0.35, 0.2];
+const STEPS: usize = 4;
+/// Where on an edge the valley is looked for.
+const WAY: [f64; 5] = [0.2, 0.35, 0.5, 0.65, 0.8];
+/// By how much [`Aligner::crossings`] must fall.
+const GAIN: f64 = 0.06;
+/// What on the way is deeper than both ends by less than this is no crossing.
+const NOISE: f64 = 0.02;
+/// Rounds of mending after each step.
+const ROUNDS: usize = 4;
+
+/// A copy of some cells, and where they come from.
+#[derive(Clone)]
+struct Copy {
+    patch: Patch,
+    cells: Vec<u32>,
+    points: Vec<u32>,
+    /// The point that is to move, and its place in the valley.
+    stray: u32,
+    bottom: Point<3>,
+    /// The mean square of its edges.
+    size: f64,
+    contrast: Contrast,
+    /// The greatest cosine that may be left: the floor, or what there is.
+    limit: f64,
+}
+
+impl Aligner<'_> {
+    /// Brings points that are left beside valleys onto them, or takes them away.
+    pub fn gather_strays(&mut self, patch: &mut Patch, open: &[bool], effort: &mut Effort) {
+        let (mut star, mut around) = (Vec::new(), Vec::new());
+        for point in 0..patch.points.len() as u32 {
+            if patch.freedom[point as usize] != 7 || !open[point as usize] {
+                continue;
+            }
+            let Some((bottom, size)) = self.bottom(patch, point, &mut star, &mut around) else {
+                continue;
+            };
+            let copy = self.surroundings(patch, point, &around, bottom, size);
+            let wanted = self.crossings(&copy) - GAIN;
+            if wanted < 0.0 {
+                continue;
+            }
+            let gains = |copy: &Copy| self.crossings(copy) < wanted;
+            let brought = self.brought(copy.clone(), effort).filter(gains);
+            let after = brought.or_else(|| {
+                let places = [self.across(&copy, patch), self.instead(&copy)].into_iter().flatten();
+                let mut merged = places.filter_map(|place| copy.merged(place, self.floor, effort));
+                merged.find(gains)
+            });
+            let Some(after) = after else { continue };
+            self.put_back(patch, &after);
+            effort.moves += 1;
+        }
+    }
+
+    /// The bottom of the valley beside a point, and the mean square of its edges; `None` if it is no stray.
+    fn bottom(
+        &self,
+        patch: &mut Patch,
+        point: u32,
+        star: &mut Vec<u32>,
+        around: &mut Vec<u32>,
+    ) -> Option<(Point<3>, f64)> {
+        star.clear();
+        patch.star(point, star);
+        around.clear();
+        let corners = star.iter().flat_map(|&cell| patch.corners[cell as usize]);
+        around.extend(corners.filter(|&c| c != point));
+        around.sort_unstable();
+        around.dedup();
+        let depths = around.iter().map(|&c| self.depths[c as usize]);
+        let deepest = depths.clone().fold(0.0, f64::max);
+        let own = self.depths[point as usize];
+        if deepest < LEAST_DEPTH || own > BESIDE * deepest {
+            return None;
+        }
+        if depths.filter(|&depth| depth > SHALLOW * deepest).count() < DEEP_NEIGHBOURS {
+            return None;
+        }
+        let at = patch.points[point as usize];
+        let squares = around.iter().map(|&c| distance_squared(&patch.points[c as usize], &at));
+        let size = squares.sum::<f64>() / around.len() as f64;
+        let shift = self.valley.fall(&at, REACH * size.sqrt())?;
+        let bottom = std::array::from_fn(|k| at[k] + shift[k]);
+        let is_far = dot(&shift, &shift) > STRAY * STRAY * size;
+        if !is_far || self.valley.depth(&bottom) <= SHALLOW * deepest {
+            return None;
+        }
+        let crossing = |&c: &u32| {
+            let ends = own.max(self.depths[c as usize]);
+            self.crossing(patch, [point, c], ends)
+        };
+        (around.iter().map(crossing).sum::<f64>() > GAIN).then_some((bottom, size))
+    }
+
+    /// A copy of the cells of a point and of its neighbours.
+    fn surroundings(
+        &self,
+        patch: &mut Patch,
+        point: u32,
+        around: &[u32],
+        bottom: Point<3>,
+        size: f64,
+    ) -> Copy {
+        let mut cells = Vec::with_capacity(256);
+        let mut of_one = Vec::with_capacity(40);
+        for &neighbour in around {
+            of_one.clear();
+            patch.star(neighbour, &mut of_one);
+            cells.extend_from_slice(&of_one);
+        }
+        cells.sort_unstable();
+        cells.dedup();
+        let mut points: Vec<u32> =
+            cells.iter().flat_map(|&cell| patch.corners[cell as usize]).collect();
+        points.sort_unstable();
+        points.dedup();
+        let local = |c: u32| points.binary_search(&c).unwrap_or(0) as u32;
+        let corners = cells.iter().map(|&c| patch.corners[c as usize].map(local)).collect();
+        let take = |of: &[u8]| points.iter().map(|&p| of[p as usize]).collect::<Vec<u8>>();
+        let at = points.iter().map(|&p| patch.points[p as usize]).collect();
+        let mut copy = Patch::new(at, take(&patch.freedom), take(&patch.sides), corners);
+        let mut contrast = Contrast::NONE;
+        points.iter().for_each(|&p| contrast.include(self.depths[p as usize]));
+        for (freedom, &p) in copy.freedom.iter_mut().zip(&points) {
+            // what is in the valley stays
+            if contrast.of(self.depths[p as usize]) > NEAR {
+                *freedom = 0;
+            }
+        }
+        let stray = local(point);
+        copy.freedom[stray as usize] = 0;
+        let limit = copy.shapes.iter().fold(self.floor, |limit, shape| limit.max(shape.cosine));
+        Copy { patch: copy, cells, points, stray, bottom, size, contrast, limit }
+    }
+
+    /// How much the valley passes between points instead of through them: the sum over edges of how much deeper it is
+    /// on the way than at both ends.
+    fn crossings(&self, copy: &Copy) -> f64 {
+        let patch = &copy.patch;
+        let mut edges: Vec<[u32; 2]> = Vec::with_capacity(400);
+        for cell in patch.cells() {
+            for i in 0..3 {
+                for j in i + 1..4 {
+                    edges.push([cell[i].min(cell[j]), cell[i].max(cell[j])]);
+                }
+            }
+        }
+        edges.sort_unstable();
+        edges.dedup();
+        let depths: Vec<f64> = patch.points.iter().map(|p| self.valley.depth(p)).collect();
+        let crossing = |&edge: &[u32; 2]| {
+            let [a, b] = edge.map(|c| depths[c as usize]);
+            self.crossing(patch, edge, a.max(b))
+        };
+        edges.iter().map(crossing).sum()
+    }
+
+    /// How much deeper the valley is on an edge than at both ends.
+    fn crossing(&self, patch: &Patch, [a, b]: [u32; 2], ends: f64) -> f64 {
+        let on_way = WAY.iter().map(|&share| self.on_way(patch, a, b, share));
+        (on_way.fold(ends, f64::max) - ends - NOISE).max(0.0)
+    }
+
+    /// The copy with the stray at the valley's bottom, mended on the way; `None` if it does not come there, or cells
+    /// are not sound then.
+    fn brought(&self, mut copy: Copy, effort: &mut Effort) -> Option<Copy> {
+        let (patch, stray) = (&mut copy.patch, copy.stray);
+        let (mut star, mut facets) = (Vec::new(), Vec::new());
+        for _ in 0..STEPS {
+            star.clear();
+            patch.star(stray, &mut star);
+            facets.clear();
+            facets.extend(star.iter().map(|&cell| facing(patch, cell, stray)));
+            let at = patch.points[stray as usize];
+            let places = SHARES
+                .map(|share| std::array::from_fn(|k| at[k] + share * (copy.bottom[k] - at[k])));
+            let possible = |to: &&Point<3>| worst_cosine(&facets, to, FLATTEST) < FLATTEST;
+            let to = places.iter().find(possible)?;
+            let is_there = *to == places[0];
+            patch.move_point(stray, *to, &star);
+            heal(patch, self.floor, ROUNDS, effort);
+            if is_there {
+                return is_sound(patch, copy.limit).then_some(copy);
+            }
+        }
+        None
+    }
+
+    /// The point that faces the stray across the valley, and the bottom between them, where both may become one.
+    fn across(&self, copy: &Copy, whole: &Patch) -> Option<(u32, Point<3>)> {
+        let (patch, stray) = (&copy.patch, copy.stray);
+        let faces = |&c: &u32| {
+            let on_way = WAY.iter().map(|&share| self.on_way(patch, stray, c, share));
+            let ends = self.depth_of(copy, c).max(self.depth_of(copy, stray));
+            let is_free = whole.freedom[copy.points[c as usize] as usize] == 7;
+            is_free && on_way.fold(0.0, f64::max) > ends + NOISE
+        };
+        let into = copy.nearest(faces, 1.0)?;
+        let [p, q] = [stray, into].map(|c| patch.points[c as usize]);
+        let middle = std::array::from_fn(|k| 0.5 * (p[k] + q[k]));
+        let shift = self.valley.fall(&middle, REACH * copy.size.sqrt()).unwrap_or_default();
+        Some((into, std::array::from_fn(|k| middle[k] + shift[k])))
+    }
+
+    /// A point in the valley so near that the stray may be left out for it.
+    fn instead(&self, copy: &Copy) -> Option<(u32, Point<3>)> {
+        let is_deep = |&c: &u32| copy.contrast.of(self.depth_of(copy, c)) > SHALLOW;
+        let into = copy.nearest(is_deep, CROWDED)?;
+        Some((into, copy.patch.points[into as usize]))
+    }
+
+    fn depth_of(&self, copy: &Copy, point: u32) -> f64 {
+        self.depths[copy.points[point as usize] as usize]
+    }
+
+    /// Puts a copy in the place of what it was made of.
+    fn put_back(&mut self, patch: &mut Patch, copy: &Copy) {
+        for (&point, at) in copy.points.iter().zip(&copy.patch.points) {
+            patch.points[point as usize] = *at;
+            self.depths[point as usize] = self.valley.depth(at);
+        }
+        let new: Vec<[u32; 4]> =
+            (copy.patch.cells()).map(|cell| cell.map(|c| copy.points[c as usize])).collect();
+        let stray = copy.points[copy.stray as usize];
+        patch.replace(&copy.cells, &new);
+        if !new.iter().flatten().any(|&c| c == stray) {
+            patch.forget(stray);
+        }
+    }
+}
+
+impl Copy {
+    /// The nearest neighbour of the stray of some kind, within a share of the length of its edges.
+    fn nearest(&self, is_one: impl Fn(&u32) -> bool, share: f64) -> Option<u32> {
+        let at = &self.patch.points[self.stray as usize];
+        let square = |c: u32| distance_squared(&self.patch.points[c as usize], at);
+        let star = self.patch.cells().filter(|cell| cell.contains(&self.stray)).flatten().copied();
+        let found = star.filter(|&c| c != self.stray && is_one(&c));
+        let nearest = found.min_by(|&a, &b| square(a).total_cmp(&square(b)).then(a.cmp(&b)))?;
+        (square(nearest) <= share * share * self.size).then_some(nearest)
+    }
+
+    /// The copy with the stray merged into a neighbour at a place, mended; `None` if cells are not sound then.
+    fn merged(&self, (into, to): (u32, Point<3>), floor: f64, effort: &mut Effort) -> Option<Self> {
+        let (patch, stray) = (&self.patch, self.stray);
+        let cells = patch.cells().filter(|cell| !(cell.contains(&stray) && cell.contains(&into)));
+        let cells = cells.map(|cell| cell.map(|c| if c == stray { into } else { c })).collect();
+        let mut points = patch.points.clone();
+        points[into as usize] = to;
+        let mut small = Patch::new(points, patch.freedom.clone(), patch.sides.clone(), cells);
+        small.freedom[into as usize] = 0;
+        // the rim is the same, so if no cell is turned over they fill the same space
+        if small.shapes.iter().any(|shape| shape.quality <= 0.0) || rim(&small) != rim(patch) {
+            return None;
+        }
+        heal(&mut small, floor, 2 * ROUNDS, effort);
+        is_sound(&small, self.limit).then(|| Self { patch: small, ..self.clone() })
+    }
+}
+
+/// How many facets nothing lies beyond.
+fn rim(patch: &Patch) -> usize {
+    let alive = (0..patch.slot_count()).filter(|&cell| patch.is_alive(cell));
+    alive.flat_map(|cell| patch.neighbours[cell as usize]).filter(|&n| n == NONE).count()
+}
+
+/// Whether no cell has a greater cosine.
+fn is_sound(patch: &Patch, limit: f64) -> bool {
+    let mut alive = (0..patch.slot_count()).filter(|&cell| patch.is_alive(cell));
+    alive.all(|cell| patch.shapes[cell as usize].cosine <= limit)
+}
