@@ -8,21 +8,42 @@ use atomesh::pipeline::{Inputs, MeshOptions, Method, Size, prepare};
 use atomesh::synth::{Geometry, Scene, SynthOptions, synthesize};
 use atomesh::watch::Silent;
 
+/// Of each cell, whether its centre is in a ball.
+fn inside(mesh: &Mesh<3>, center: &[f64; 3], radius: f64) -> Vec<bool> {
+    let is_inside = |cell: atomesh::geometry::Simplex<3>| {
+        let sum = |k: usize| cell.first[k] + cell.others.iter().map(|p| p[k]).sum::<f64>();
+        let middle = std::array::from_fn(|k| 0.25 * sum(k));
+        distance_squared(&middle, center) < radius * radius
+    };
+    mesh.simplices().map(is_inside).collect()
+}
+
 /// The volume of the cells whose centres are in a ball, over the ball's.
 fn share(mesh: &Mesh<3>, center: &[f64; 3], radius: f64) -> f64 {
-    let volume: f64 = (mesh.simplices())
-        .filter(|cell| {
-            let sum = |k: usize| cell.first[k] + cell.others.iter().map(|p| p[k]).sum::<f64>();
-            let middle = std::array::from_fn(|k| 0.25 * sum(k));
-            distance_squared(&middle, center) < radius * radius
-        })
-        .map(|cell| cell.measure())
-        .sum();
+    let cells = mesh.simplices().zip(inside(mesh, center, radius));
+    let volume: f64 = cells.filter(|(_, inside)| *inside).map(|(cell, _)| cell.measure()).sum();
     volume / (4.0 / 3.0 * std::f64::consts::PI * radius.powi(3))
 }
 
+/// How far the corners of the facets between cells inside and outside are from the sphere at most.
+fn farthest(mesh: &Mesh<3>, center: &[f64; 3], radius: f64) -> f64 {
+    let mut facets: Vec<([u32; 3], bool)> = Vec::new();
+    for (corners, inside) in mesh.cells().zip(inside(mesh, center, radius)) {
+        for k in 0..4 {
+            let mut facet = [1, 2, 3].map(|n| corners[(k + n) % 4]);
+            facet.sort_unstable();
+            facets.push((facet, inside));
+        }
+    }
+    facets.sort_unstable();
+    let between = facets.windows(2).filter(|w| w[0].0 == w[1].0 && w[0].1 != w[1].1);
+    let corners = between.flat_map(|w| w[0].0);
+    let off = |c: u32| (distance_squared(&mesh.points()[c as usize], center).sqrt() - radius).abs();
+    corners.map(off).fold(0.0, f64::max)
+}
+
 #[test]
-fn the_volume_in_a_sphere_is_far_nearer_to_the_truth_than_with_corners_on_it() {
+fn a_sphere_is_far_nearer_to_the_truth_than_with_corners_on_it() {
     let drawn = synthesize(Scene::Sphere, &SynthOptions::new([80; 3])).unwrap();
     let Geometry::Sphere { center, radius } = drawn.truth.features[0].geometry else {
         panic!("a sphere is a sphere");
@@ -43,8 +64,11 @@ fn the_volume_in_a_sphere_is_far_nearer_to_the_truth_than_with_corners_on_it() {
     let chord = 0.375 * (size / radius).powi(2);
     let full = meshed(Align::Full);
     let error = (share(full.mesh(), &center, radius) - 1.0).abs();
-    assert!(error < 0.3 * chord, "{error} {chord}");
+    assert!(error < 0.5 * chord, "{error} {chord}");
     let off = meshed(Align::Off);
+    // a point beside the valley's bottom, whose cells pass for either side, is 1 to 3 samples off
+    let [far, near] = [&off, &full].map(|o| farthest(o.mesh(), &center, radius));
+    assert!(near < 1.0 && far > 1.5, "{near} {far}");
     assert!(off.improve_report().is_none() && off.mesh() != full.mesh());
     let report = full.improve_report().unwrap();
     assert!(report.floor_held && report.angle_after >= 15.0, "{report:?}");
