@@ -16,6 +16,7 @@
 //!
 //! Cost: a few passes over the samples. Memory: one f32 a sample beside the image.
 
+mod crest;
 mod labels;
 mod mixture;
 mod quantile;

@@ -5,13 +5,17 @@ mod frame;
 mod gaussian;
 mod gradient;
 mod samples;
+mod stream;
+mod tensor;
 
 pub use frame::{Frame, FrameError, Grid, Units};
 pub use gaussian::{gaussian, gaussian_derivative};
 pub(crate) use gaussian::{gaussian_between, gaussian_derivative_into};
-pub(crate) use gradient::{Stencil, magnitude};
+pub(crate) use gradient::magnitude;
 pub use gradient::{gradient_magnitude, prewitt_magnitude};
 pub use samples::{Range, Samples};
+pub(crate) use stream::{Run, Stencil, Stream};
+pub use tensor::StructureTensor;
 
 /// Samples on a regular grid, with the frame that says where they are.
 ///
