@@ -2,7 +2,7 @@
 
 use atomesh::enhance::{FeatureOptions, Features, enhance};
 use atomesh::image::{
-    Frame, Grid, Image, Samples, gaussian, gradient_magnitude, prewitt_magnitude,
+    Frame, Grid, Image, Samples, StructureTensor, gaussian, gradient_magnitude, prewitt_magnitude,
 };
 use atomesh::watch::Silent;
 use criterion::{Criterion, Throughput, criterion_group, criterion_main};
@@ -35,6 +35,11 @@ fn image_work(criterion: &mut Criterion) {
         b.iter(|| gradient_magnitude(&samples, &grid, 1.5));
     });
     group.bench_function("gradient_prewitt", |b| b.iter(|| prewitt_magnitude(&samples, &grid)));
+
+    let layered: Vec<f32> = layers().iter().map(|&v| v.into()).collect();
+    group.bench_function("tensor", |b| {
+        b.iter(|| StructureTensor::new(&layered, &grid, 3.0, [12.0; 3], &mut Silent));
+    });
 
     let Ok(frame) = Frame::new(SHAPE) else { return };
     let Ok(image) = Image::new(frame, samples) else { return };

@@ -17,9 +17,13 @@
 //! Cost: a few passes over the samples. Memory: one f32 a sample beside the image.
 
 mod crest;
+mod crossings;
+mod edge_crests;
+mod horizons;
 mod labels;
 mod mixture;
 mod quantile;
+mod ridges;
 mod scale;
 
 use crate::image::{Grid, Image, Samples, Stencil, Units, gaussian, gaussian_between, magnitude};
@@ -30,6 +34,10 @@ use rayon::prelude::*;
 use scale::{Ramp, UnitSamples};
 use serde::{Deserialize, Serialize};
 use std::str::FromStr;
+
+pub use edge_crests::EdgeCrestOptions;
+pub use horizons::{HorizonOptions, Polarity};
+pub use ridges::RidgeOptions;
 
 /// Of all samples, the share whose gradient is clipped to −1.
 const CLIPPED_EDGES: f64 = 0.005;

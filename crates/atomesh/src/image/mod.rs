@@ -1,5 +1,6 @@
 //! Images: samples on a grid, and the frame that places the grid in the world.
 
+mod cells;
 mod convolve;
 mod frame;
 mod gaussian;
@@ -8,6 +9,7 @@ mod samples;
 mod stream;
 mod tensor;
 
+pub(crate) use cells::{CellAverages, Entries};
 pub use frame::{Frame, FrameError, Grid, Units};
 pub use gaussian::{gaussian, gaussian_derivative};
 pub(crate) use gaussian::{gaussian_between, gaussian_derivative_into};

@@ -1,0 +1,309 @@
+//! Ridges: the middles of lines (2-D) and sheets (3-D) that are brighter, or darker, than what is about them.
+//!
+//! In this order, after Hale (2002):
+//!
+//! 1. the normals of features, from the structure tensor, or from the image's curvature where
+//!    features are too close to each other for the former;
+//! 2. where the smoothed image is brighter than the background, the zero crossings of its derivative along the
+//!    normal at which it is greatest;
+//! 3. groups of crests that are strong somewhere, nowhere faint, and large enough.
+//!
+//! The background is the median; a full feature is as bright as the 98th percentile of all crests. Departure
+//! from Hale: crossings are found between samples, so that what is made of them is alike at any slant.
+
+use super::EnhanceError;
+use super::crest::{Crest, connected};
+use super::crossings::{Unit, crossings, scale_strengths};
+use crate::geometry::linear::largest_eigenpair;
+use crate::image::{Grid, StructureTensor};
+use crate::watch::{Phase, Watch, check};
+use serde::{Deserialize, Serialize};
+
+/// How ridges are found.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(default, deny_unknown_fields, rename_all = "kebab-case")]
+pub struct RidgeOptions {
+    /// Whether features are darker than what is about them; else they are brighter.
+    pub dark: bool,
+    /// Standard deviation of the Gaussian whose derivatives are taken, in least steps. Default 1.5: as wide as
+    /// features of three samples, and blind to what is finer. Hale's (2002) is 3.
+    pub scale: f64,
+    /// Standard deviation of the Gaussian that smooths the structure tensor, in least steps. 0 takes normals from the second
+    /// derivatives at each sample instead, for features that cross or lie close together. Default 12, Hale's (2002).
+    pub normal_scale: f64,
+    /// How strong crests must be, 0…1 between the background and a full feature. Default 0.2.
+    pub low: f32,
+    /// How strong a group of crests must be somewhere, 0…1. Default 0.4.
+    pub high: f32,
+    /// The least length of a line, in samples; the least area of a sheet is its square. Default 10.
+    pub least_length: f64,
+}
+
+impl Default for RidgeOptions {
+    fn default() -> Self {
+        Self { dark: true, scale: 1.5, normal_scale: 12.0, low: 0.2, high: 0.4, least_length: 10.0 }
+    }
+}
+
+/// How many crests a group has at least whose features are at least so long.
+pub(super) fn least_count<const D: usize>(length: f64) -> usize {
+    length.max(0.0).powi(D as i32 - 1).ceil() as usize
+}
+
+/// The ridges of an image of finite values; none if it is constant.
+///
+/// # Errors
+/// [`EnhanceError::Cancelled`] if the watch ends the work.
+///
+/// # Panics
+/// If there are not as many values as the grid's shape says, or a scale is out of its range.
+pub(crate) fn ridges<const D: usize>(
+    values: &[f32],
+    grid: &Grid<D>,
+    options: &RidgeOptions,
+    watch: &mut dyn Watch,
+) -> Result<Vec<Crest<D>>, EnhanceError> {
+    let Some(unit) = Unit::new(values) else { return Ok(Vec::new()) };
+    check(watch, Phase::Potential, 0.0, None)?;
+    let least = grid.least_step();
+    let grid = Grid { step: grid.step.map(|step| step / least), ..*grid };
+    let sign = if options.dark { -1.0 } else { 1.0 };
+    let background = unit.quantile(0.5);
+    let fill = |start: usize, out: &mut [f32]| {
+        unit.fill(start, out);
+        out.iter_mut().for_each(|v| *v = sign * (*v - background));
+    };
+    let smooth = grid.step.map(|step| options.normal_scale / step);
+    let tensor = if options.normal_scale > 0.0 {
+        Some(StructureTensor::new(values, &grid, options.scale, smooth, watch)?)
+    } else {
+        None
+    };
+    let visit = |row: &super::crossings::Row<D>, crests: &mut Vec<Crest<D>>| {
+        let normals = tensor.as_ref().and_then(|tensor| tensor.row(row.sample));
+        for (x, &value) in row.average.iter().enumerate() {
+            if value <= 0.0 {
+                continue;
+            }
+            let normal = match &normals {
+                Some(normals) => normals.normal(x).0,
+                None => across(row.hessian(x)),
+            };
+            let bend = row.second(&normal, x);
+            if bend < 0.0 {
+                let gradient = row.gradient(x);
+                let slope: f32 = (0..D).map(|k| gradient[k] * normal[k]).sum();
+                let offset = -slope / bend;
+                crests.extend(row.crest(x, normal, offset, value + 0.5 * slope * offset));
+            }
+        }
+    };
+    let mut crests = crossings(fill, &grid, options.scale, visit, watch)?;
+    scale_strengths(&mut crests);
+    let least = least_count::<D>(options.least_length);
+    Ok(connected(crests, grid.shape, options.low, options.high, least))
+}
+
+/// The direction in which the image is bent downwards most.
+fn across<const D: usize>(hessian: [[f64; D]; D]) -> [f32; D] {
+    largest_eigenpair(hessian.map(|row| row.map(|h| -h))).1.map(|n| n as f32)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::super::crest::coordinates;
+    use super::*;
+    use crate::watch::Silent;
+    use proptest::prelude::*;
+
+    /// How far a sample is from the middle of the box along a unit normal, in lattice units.
+    fn across_middle<const D: usize>(grid: &Grid<D>, normal: [f64; D], index: usize) -> f64 {
+        let sample = coordinates(index, grid.shape);
+        let from_middle =
+            |k: usize| (sample[k] as f64 - 0.5 * (grid.shape[k] - 1) as f64) * grid.step[k];
+        (0..D).map(|k| normal[k] * from_middle(k)).sum()
+    }
+
+    fn unit<const D: usize>(v: [f64; D]) -> [f64; D] {
+        let norm = v.iter().map(|x| x * x).sum::<f64>().sqrt();
+        v.map(|x| x / norm)
+    }
+
+    fn found<const D: usize>(
+        values: &[f32],
+        grid: &Grid<D>,
+        options: &RidgeOptions,
+    ) -> Vec<Crest<D>> {
+        ridges(values, grid, options, &mut Silent).unwrap()
+    }
+
+    /// Crests of a tilted Gaussian sheet are on it.
+    fn is_on_the_sheet<const D: usize>(grid: Grid<D>, normal: [f64; D], normal_scale: f64) {
+        let (normal, width) = (unit(normal), 1.5 * grid.least_step());
+        let values: Vec<f32> = (0..grid.sample_count())
+            .map(|i| (-0.5 * (across_middle(&grid, normal, i) / width).powi(2)).exp() as f32)
+            .collect();
+        let options = RidgeOptions { dark: false, normal_scale, ..Default::default() };
+        let crests = found(&values, &grid, &options);
+        let inner = |k: usize, i: usize| (7..grid.shape[k] - 7).contains(&i);
+        let mut count = 0;
+        for crest in &crests {
+            let sample = coordinates(crest.index, grid.shape);
+            if !(0..D).all(|k| inner(k, sample[k])) {
+                continue; // where mirrored samples bend the sheet
+            }
+            let from_middle = |k: usize| {
+                (f64::from(crest.point[k]) - 0.5 * (grid.shape[k] - 1) as f64) * grid.step[k]
+            };
+            let off: f64 = (0..D).map(|k| normal[k] * from_middle(k)).sum();
+            // a Newton step of half a sample from a ridge of width √(1.5² + 1.5²) is 3 % long, and
+            // differences over two samples lessen its bend by a few percent more
+            assert!(off.abs() < 0.06 * grid.least_step(), "{off} at {sample:?} {normal:?}");
+            let cosine: f64 = (0..D).map(|k| normal[k] * f64::from(crest.normal[k])).sum();
+            assert!(cosine.abs() > 0.999, "{cosine} {normal:?}");
+            count += 1;
+        }
+        // every column along the steepest axis has one
+        let steepest =
+            (0..D).fold(0, |best, k| if normal[k].abs() > normal[best].abs() { k } else { best });
+        let columns: usize =
+            (0..D).filter(|&k| k != steepest).map(|k| grid.shape[k] - 14).product();
+        assert!(2 * count > columns, "{count} of {columns}");
+    }
+
+    proptest! {
+        #![proptest_config(ProptestConfig::with_cases(12))]
+        #[test]
+        fn crests_are_on_tilted_sheets(normal in prop::array::uniform3(-1.0..1.0f64)) {
+            prop_assume!(normal[..2].iter().map(|n| n * n).sum::<f64>() > 0.05);
+            for normal_scale in [0.0, 4.0] {
+                is_on_the_sheet(Grid { shape: [40, 37], step: [1.0; 2] }, [normal[0], normal[1]], normal_scale);
+                is_on_the_sheet(Grid { shape: [24, 27, 25], step: [2.0; 3] }, normal, normal_scale);
+            }
+        }
+    }
+
+    /// A ring of radius 15, dark on bright.
+    fn ring(n: usize) -> Vec<f32> {
+        let middle = 0.5 * (n - 1) as f64;
+        let value = |i: usize| {
+            let (x, y) = ((i % n) as f64 - middle, (i / n) as f64 - middle);
+            5.0 - (-0.5 * ((x.hypot(y) - 15.0) / 1.2).powi(2)).exp()
+        };
+        (0..n * n).map(|i| value(i) as f32).collect()
+    }
+
+    #[test]
+    fn crests_of_a_ring_are_on_it_and_close() {
+        let grid = Grid { shape: [51, 51], step: [1.0; 2] };
+        let options = RidgeOptions { normal_scale: 2.0, ..Default::default() };
+        let crests = found(&ring(51), &grid, &options);
+        let mut angles: Vec<f64> = Vec::new();
+        for crest in crests {
+            let [x, y] = crest.point.map(|p| f64::from(p) - 25.0);
+            // smoothing by 1.5 moves a ring outwards by about σ²/2R = 0.08, tensors turn normals a little
+            assert!((x.hypot(y) - 15.0).abs() < 0.15, "{}", x.hypot(y));
+            angles.push(y.atan2(x));
+        }
+        angles.sort_by(f64::total_cmp);
+        // neighbours on a slanted line are √2 samples apart
+        let widest = angles.windows(2).map(|w| w[1] - w[0]).fold(0.0, f64::max);
+        assert!(widest * 15.0 < 1.7, "{}", widest * 15.0);
+    }
+
+    #[test]
+    fn bright_is_dark_of_the_negative() {
+        let grid = Grid { shape: [51, 51], step: [1.0; 2] };
+        let dark = ring(51);
+        let bright: Vec<f32> = dark.iter().map(|v| 5.0 - v).collect();
+        let options = RidgeOptions { normal_scale: 2.0, ..Default::default() };
+        let [a, b] = [(&dark, true), (&bright, false)]
+            .map(|(values, dark)| found(values, &grid, &RidgeOptions { dark, ..options }));
+        assert!(!a.is_empty() && a.len() == b.len());
+        for (a, b) in a.iter().zip(&b) {
+            assert_eq!(a.index, b.index);
+            assert!((0..2).all(|k| (a.point[k] - b.point[k]).abs() < 1e-3));
+        }
+    }
+
+    #[test]
+    fn short_lines_are_left_out() {
+        let grid = Grid { shape: [60, 30], step: [1.0; 2] };
+        let on =
+            |x: usize, y: usize| y == 8 && (5..55).contains(&x) || y == 22 && (20..26).contains(&x);
+        let values: Vec<f32> =
+            (0..1800).map(|i| if on(i % 60, i / 60) { 1.0 } else { 0.0 }).collect();
+        let options = RidgeOptions {
+            dark: false,
+            normal_scale: 4.0,
+            least_length: 20.0,
+            ..Default::default()
+        };
+        let crests = found(&values, &grid, &options);
+        assert!(
+            crests.iter().all(|crest| (7..10).contains(&(crest.index / 60))) && crests.len() > 40
+        );
+        let all = found(&values, &grid, &RidgeOptions { least_length: 0.0, ..options });
+        assert!(all.iter().any(|crest| crest.index / 60 == 22));
+    }
+
+    #[test]
+    fn constant_and_thin_images_have_none_or_no_trouble() {
+        for shape in [[7, 5, 1], [1, 1, 1], [1, 9, 4], [2, 2, 2]] {
+            let grid = Grid { shape, step: [1.0; 3] };
+            let count = grid.sample_count();
+            assert!(found(&vec![3.0; count], &grid, &RidgeOptions::default()).is_empty());
+            let values: Vec<f32> = (0..count).map(|i| (i * 7 % 5) as f32).collect();
+            for normal_scale in [0.0, 12.0] {
+                let options =
+                    RidgeOptions { normal_scale, least_length: 0.0, ..Default::default() };
+                for crest in found(&values, &grid, &options) {
+                    let sample = coordinates(crest.index, shape);
+                    assert!((0..3).all(|k| (crest.point[k] - sample[k] as f32).abs() <= 0.6));
+                    assert!((0.0..=1.0).contains(&crest.strength));
+                }
+            }
+        }
+    }
+
+    #[test]
+    fn a_turned_image_has_turned_ridges() {
+        let grid = Grid { shape: [51, 51], step: [1.0; 2] };
+        let mut values = ring(51);
+        values
+            .iter_mut()
+            .enumerate()
+            .for_each(|(i, v)| *v -= ((i * i * 7919) % 1009) as f32 * 4e-4);
+        let backwards: Vec<f32> = values.iter().rev().copied().collect();
+        let swapped: Vec<f32> = (0..2601).map(|i| values[i % 51 * 51 + i / 51]).collect();
+        let options = RidgeOptions { normal_scale: 3.0, ..Default::default() };
+        let crests = found(&values, &grid, &options);
+        let near = |others: Vec<Crest<2>>, back: &dyn Fn([f32; 2]) -> [f32; 2]| {
+            let same = |a: &Crest<2>| {
+                others.iter().any(|b| {
+                    let [x, y] = back(b.point);
+                    (a.point[0] - x).abs().max((a.point[1] - y).abs()) < 1e-2
+                })
+            };
+            crests.iter().filter(|crest| same(crest)).count()
+        };
+        // rounding may decide of crests at the edge of a threshold
+        let least = crests.len() * 99 / 100;
+        assert!(near(found(&backwards, &grid, &options), &|[x, y]| [50.0 - x, 50.0 - y]) >= least);
+        assert!(near(found(&swapped, &grid, &options), &|[x, y]| [y, x]) >= least);
+        assert!(crests.len() > 80);
+    }
+
+    #[test]
+    fn bits_do_not_depend_on_the_number_of_threads() {
+        let grid = Grid { shape: [19, 23, 90], step: [1.0; 3] };
+        let values: Vec<f32> =
+            (0..grid.sample_count()).map(|i| ((i * i * 7919 + 3 * i) % 1999) as f32).collect();
+        let run = |threads| {
+            let pool = rayon::ThreadPoolBuilder::new().num_threads(threads).build().unwrap();
+            pool.install(|| found(&values, &grid, &RidgeOptions::default()))
+        };
+        let one = run(1);
+        assert!(!one.is_empty() && one == run(3) && one == run(8));
+    }
+}
