@@ -20,6 +20,7 @@ mod crest;
 mod crossings;
 mod edge_crests;
 mod horizons;
+mod faults;
 mod labels;
 mod mixture;
 mod quantile;
@@ -211,6 +212,18 @@ pub enum EnhanceError {
     Labels {
         /// How many different samples there are.
         count: usize,
+    },
+    /// An option of the search for faults is out of its range.
+    #[error("{option} of faults is {value}; expected {least} to {most}")]
+    FaultOption {
+        /// The option's name.
+        option: &'static str,
+        /// The value found.
+        value: f64,
+        /// The least value.
+        least: f64,
+        /// The greatest value.
+        most: f64,
     },
     /// The watch ended the work.
     #[error(transparent)]
