@@ -162,12 +162,12 @@ fn folded_layers_without_faults_have_none() {
     let volume = layers([56, 52, 60], |p| p[2] - folded(&p) - 2.0 * (0.08 * p[1]).sin());
     assert_eq!(found(&section, [160, 120]), []);
     assert_eq!(found(&volume, [56, 52, 60]), []);
-    // in noise some groups may pass for a fault; each is as long as its least extent or a little longer
-    for seed in 0..4 {
-        let quiet = found(&with_noise(section.clone(), 10.0, seed), [160, 120]);
-        let loud = found(&with_noise(section.clone(), 3.0, seed), [160, 120]);
-        assert!(quiet.len() <= 30 && loud.len() <= 60, "{} {}", quiet.len(), loud.len());
-    }
+    // in noise some groups may pass for a fault; one through the whole section has 120 crests
+    let count = |decibels, seed| found(&with_noise(section.clone(), decibels, seed), [160, 120]).len();
+    let quiet: Vec<usize> = (0..6).map(|seed| count(10.0, seed)).collect();
+    let loud: Vec<usize> = (0..6).map(|seed| count(3.0, seed)).collect();
+    println!("crests without faults: {quiet:?} at 10 dB, {loud:?} at 3 dB");
+    assert!(quiet.iter().all(|&n| n <= 60) && loud.iter().all(|&n| n <= 120), "{quiet:?} {loud:?}");
     assert_eq!(found(&with_noise(volume, 3.0, 0), [56, 52, 60]), []);
 }
 
