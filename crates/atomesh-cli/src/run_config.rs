@@ -3,7 +3,10 @@
 use std::path::PathBuf;
 
 use atomesh::distance::GradeBy;
-use atomesh::enhance::{EdgeOperator, FeatureOptions, Mixture};
+use atomesh::enhance::{
+    EdgeCrestOptions, EdgeOperator, FaultOptions, FeatureOptions, HorizonOptions, Mixture,
+    Polarity, RidgeOptions,
+};
 use atomesh::image::Units;
 use atomesh::improve::{Align, ImproveOptions};
 use atomesh::optimize::{EngineKind, OptimizeOptions};
@@ -51,28 +54,71 @@ section! {
 section! {
     /// How the image becomes a potential.
     pub struct PotentialOptions {
-        /// What attracts atoms: dark or bright places, edges, places where labels meet (labels), or none. Several
-        /// kinds may share a potential, each with its weight: dark:1,edges:0.5. Default: dark
+        /// What attracts atoms. Of images that show it: dark or bright places, edges, places where labels meet
+        /// (labels), or none. Of raw images: ridges (the middles of lines and sheets), and of seismic amplitudes
+        /// faults and horizons. Several may share a potential, each with its weight, as in faults,horizons:0.5.
+        /// Default: dark
         #[arg(long, visible_alias = "as", value_name = "KIND[:WEIGHT],...")]
         pub features: Text<Mixture>,
-        /// How edges are found: derivatives of a Gaussian, or the paper's Prewitt differences.
-        /// Default: gaussian
+        /// How edges are found: by derivatives of a Gaussian; by the paper's Prewitt differences; or thinned to
+        /// where a Gaussian's are steepest (crest) and widened to valleys of one depth. Default: gaussian
         #[arg(long, value_name = "OPERATOR",
-            value_parser = named::<EdgeOperator>(&["gaussian", "prewitt"]))]
+            value_parser = named::<EdgeOperator>(&["gaussian", "prewitt", "crest"]))]
         pub edge_operator: EdgeOperator,
         /// Standard deviation of the Gaussian that finds edges, or where labels meet, in least steps, 0.3
-        /// or more. Default: 1.5
+        /// or more. Default: 1.5; of crests as wide as the noise asks for
         #[arg(long, value_name = "SIGMA",
             value_parser = number_in(0.3, 1000.0, "a number of samples from 0.3 to 1000"))]
         pub edge_scale: f64,
+        /// Which ridges and horizons: bright ones (peaks), dark ones (troughs), or both. Default: bright
+        #[arg(long, value_name = "WHICH",
+            value_parser = named::<Polarity>(&["bright", "dark", "both"]))]
+        pub polarity: Polarity,
+        /// Standard deviation, in least steps, of the Gaussian whose derivatives find ridges and horizons, 0.3 or more.
+        /// Default: 1.5 for ridges, 1 for horizons
+        #[arg(long, value_name = "SIGMA",
+            value_parser = number_in(0.3, 1000.0, "a number of samples from 0.3 to 1000"))]
+        pub scale: f64,
+        /// Standard deviation, in least steps, of the Gaussian over which the directions of ridges and horizons are
+        /// averaged; of ridges also 0, the direction at each sample. Default: 12 for ridges, 8 for horizons
+        #[arg(long, value_name = "SIGMA",
+            value_parser = number_in(0.0, 1000.0, "a number of samples from 0 to 1000"))]
+        pub normal_scale: f64,
+        /// Least strength of ridges, horizons, faults and crests of edges, 0 to 1, where they hang together with
+        /// stronger parts. Default: 0.3, 0.15, 0.1, 0.2
+        #[arg(long, value_name = "SHARE", value_parser = number_in(0.0, 1.0, "a number from 0 to 1"))]
+        pub low: f64,
+        /// Strength that each of them reaches somewhere, 0 to 1. Default: 0.5; of horizons 0.4
+        #[arg(long, value_name = "SHARE", value_parser = number_in(0.0, 1.0, "a number from 0 to 1"))]
+        pub high: f64,
+        /// Least length of each of them in samples; in a volume its square is the least area. Default: 10 for ridges
+        /// and edges, 20 for horizons and faults
+        #[arg(long, value_name = "LENGTH",
+            value_parser = number_in(0.0, 1e6, "a number of samples from 0 to 1e6"))]
+        pub least_length: f64,
+        /// Mean distance along layers, in samples, of what is compared on the two sides of a fault: more withstands
+        /// more noise, and blurs faults close together. Default: 4
+        #[arg(long, value_name = "LENGTH",
+            value_parser = number_in(1.0, 1000.0, "a number of samples from 1 to 1000"))]
+        pub layer_reach: f64,
+        /// Standard deviation of the mean along a fault's dip, in samples: more withstands more noise, and blurs faults
+        /// that bend. Default: 12
+        #[arg(long, value_name = "SIGMA",
+            value_parser = number_in(0.5, 1000.0, "a number of samples from 0.5 to 1000"))]
+        pub dip_reach: f64,
+        /// Least dip of faults from the horizontal in degrees, 20 to 85, where samples are as far apart along all axes.
+        /// Default: 45
+        #[arg(long, value_name = "DEGREES",
+            value_parser = number_in(20.0, 85.0, "an angle from 20 to 85"))]
+        pub least_dip: f64,
         /// Push atoms off features, so that they line up alongside. Default: false; true with
         /// --mesh voronoi, whose faces then fall on the features
         #[arg(long, value_name = "BOOL", num_args = 0..=1, require_equals = true,
             default_missing_value = "true")]
         pub repel: bool,
-        /// Standard deviation in lattice units of a Gaussian over the potential. Default: the
-        /// least step for dark and bright features, a quarter of the edge length where they repel
-        /// with --mesh voronoi, none for edges
+        /// Standard deviation in lattice units of a Gaussian over the potential; the width of the valleys of ridges,
+        /// faults, horizons and crests. Default: the least step, for dark and bright features a quarter of the edge
+        /// length where they repel with --mesh voronoi; none for edges
         #[arg(long, value_name = "SIGMA",
             value_parser = number_in(0.0, f64::MAX, "a length of 0 or more"))]
         pub smooth: f64,
@@ -89,6 +135,38 @@ impl PotentialOptions {
             edge_scale: self.edge_scale.unwrap_or(basis.edge_scale),
             smooth: self.smooth.or(basis.smooth),
             repel: self.repel.unwrap_or(basis.repel),
+            ridges: RidgeOptions {
+                polarity: self.polarity.unwrap_or(basis.ridges.polarity),
+                scale: self.scale.unwrap_or(basis.ridges.scale),
+                normal_scale: self.normal_scale.unwrap_or(basis.ridges.normal_scale),
+                low: self.low.map_or(basis.ridges.low, |low| low as f32),
+                high: self.high.map_or(basis.ridges.high, |high| high as f32),
+                least_length: self.least_length.unwrap_or(basis.ridges.least_length),
+            },
+            horizons: HorizonOptions {
+                polarity: self.polarity.unwrap_or(basis.horizons.polarity),
+                scale: self.scale.unwrap_or(basis.horizons.scale),
+                normal_scale: self.normal_scale.unwrap_or(basis.horizons.normal_scale),
+                low: self.low.map_or(basis.horizons.low, |low| low as f32),
+                high: self.high.map_or(basis.horizons.high, |high| high as f32),
+                least_length: self.least_length.unwrap_or(basis.horizons.least_length),
+                ..basis.horizons
+            },
+            faults: FaultOptions {
+                layer_reach: self.layer_reach.unwrap_or(basis.faults.layer_reach),
+                dip_reach: self.dip_reach.unwrap_or(basis.faults.dip_reach),
+                least_dip: self.least_dip.unwrap_or(basis.faults.least_dip),
+                low: self.low.unwrap_or(basis.faults.low),
+                high: self.high.unwrap_or(basis.faults.high),
+                least_length: self.least_length.unwrap_or(basis.faults.least_length),
+                ..basis.faults
+            },
+            crests: EdgeCrestOptions {
+                scale: self.edge_scale.or(basis.crests.scale),
+                low: self.low.map_or(basis.crests.low, |low| low as f32),
+                high: self.high.map_or(basis.crests.high, |high| high as f32),
+                least_length: self.least_length.unwrap_or(basis.crests.least_length),
+            },
             ..basis
         }
     }
@@ -374,6 +452,7 @@ impl RunConfig {
                 edge_scale: Some(features.edge_scale),
                 repel: Some(features.repel),
                 smooth: features.smooth,
+                ..Default::default()
             },
             regions: RegionOptions { least_island: Some(mesh.least_island as u64) },
             optimize: OptimizerOptions {
@@ -392,6 +471,9 @@ impl RunConfig {
             },
             ..Default::default()
         };
+        if self.features.edge_operator == Some(EdgeOperator::Crest) {
+            defaults.features.edge_scale = None; // it depends on the image
+        }
         if self.input.potential.is_some() {
             // the options of features have no part in the run
             defaults.features = PotentialOptions::default();

@@ -47,10 +47,12 @@ pub struct EnhanceArgs {
 
 const EXAMPLES: &str = "\
 Examples:
+  Faults in a seismic section, and half as strong its reflections:
+    atomesh enhance section.sgy -o faults.npy --as faults,horizons:0.5 --picture faults.png
+  Thin dark lines of a micrograph, as valleys of one depth and width:
+    atomesh enhance micrograph.tif -o lines.npy --as ridges --polarity dark
   The outlines in a brain scan:
-    atomesh enhance t1.nii.gz -o outlines.nii.gz --as edges --picture outlines.png
-  Dark lines and, half as strong, edges:
-    atomesh enhance slice.png -o b.npy --as dark,edges:0.5";
+    atomesh enhance t1.nii.gz -o outlines.nii.gz --as edges --picture outlines.png";
 
 /// Runs the command; the text is for standard output.
 ///
@@ -103,7 +105,9 @@ fn enhance<const D: usize>(
     let Enhanced { values, constant } = enhance_mixture(&mixture, &options, |_| &image, watch)
         .map_err(|e| match e {
             EnhanceError::Cancelled(_) => Failure::cancelled(),
-            EnhanceError::EdgeScale { .. } | EnhanceError::Smooth { .. } => Failure::misuse(e),
+            EnhanceError::EdgeScale { .. }
+            | EnhanceError::Smooth { .. }
+            | EnhanceError::Option { .. } => Failure::misuse(e),
             _ => Failure::content(e).about(&args.image),
         })?;
     if constant {

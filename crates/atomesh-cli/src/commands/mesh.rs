@@ -402,7 +402,9 @@ impl Job<'_> {
             PipelineError::Distance(_)
             | PipelineError::Potential(PotentialError::Weight { .. })
             | PipelineError::Enhance(
-                EnhanceError::EdgeScale { .. } | EnhanceError::Smooth { .. },
+                EnhanceError::EdgeScale { .. }
+                | EnhanceError::Smooth { .. }
+                | EnhanceError::Option { .. },
             )
             | PipelineError::Lattice(LatticeError::SpacingFactor { .. })
             | PipelineError::Optimize(OptimizeError::Option { .. })

@@ -12,8 +12,23 @@ use super::quantile::{Order, Ranks};
 use crate::image::{Grid, Run, Stencil, Stream};
 use crate::watch::{Cancelled, Phase, Watch, check};
 use rayon::prelude::*;
+use serde::{Deserialize, Serialize};
 use std::collections::VecDeque;
 use std::ops::Range;
+
+/// Which of the lines and sheets along which an image is extreme count.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(rename_all = "lowercase")]
+#[non_exhaustive]
+pub enum Polarity {
+    /// Those brighter than what is about them; of amplitudes, peaks.
+    #[default]
+    Bright,
+    /// Those darker than what is about them; of amplitudes, troughs.
+    Dark,
+    /// Both.
+    Both,
+}
 
 /// How far from its sample a crest may be along any axis, in samples: half, and what rounding and
 /// differences may be off, lest crests have gaps.

@@ -7,11 +7,11 @@
 //!    the second derivative at which the third is negative;
 //! 3. groups of crests that are strong somewhere, nowhere faint or as weak as noise, and large enough.
 
-use super::EnhanceError;
 use super::crest::{Crest, connected};
 use super::crossings::{Row, Unit, crossings, scale_strengths};
 use super::quantile::{Order, Ranks};
 use super::ridges::least_count;
+use super::{EnhanceError, LEAST_EDGE_SCALE, LONGEST, MOST_EXTENT, within};
 use crate::image::Grid;
 use crate::watch::{Phase, Watch, check};
 use serde::{Deserialize, Serialize};
@@ -53,19 +53,36 @@ impl Default for EdgeCrestOptions {
     }
 }
 
+impl EdgeCrestOptions {
+    /// Refuses what is out of range.
+    fn check(&self) -> Result<(), EnhanceError> {
+        within(
+            "edges",
+            &[
+                ("scale", self.scale.unwrap_or(1.0), LEAST_EDGE_SCALE, LONGEST),
+                ("low", self.low.into(), 0.0, 1.0),
+                ("high", self.high.into(), 0.0, 1.0),
+                ("least-length", self.least_length, 0.0, MOST_EXTENT),
+            ],
+        )
+    }
+}
+
 /// The crests of an image's edges; none if it is constant.
 ///
 /// # Errors
-/// [`EnhanceError::Cancelled`] if the watch ends the work.
+/// [`EnhanceError::Option`] for an option out of its range, [`EnhanceError::Cancelled`] if the watch ends the
+/// work.
 ///
 /// # Panics
-/// If there are not as many values as the grid's shape says, or a scale is out of its range.
+/// If there are not as many values as the grid's shape says.
 pub(crate) fn edge_crests<const D: usize>(
     values: &[f32],
     grid: &Grid<D>,
     options: &EdgeCrestOptions,
     watch: &mut dyn Watch,
 ) -> Result<Vec<Crest<D>>, EnhanceError> {
+    options.check()?;
     let Some(unit) = Unit::new(values) else { return Ok(Vec::new()) };
     check(watch, Phase::Potential, 0.0, None)?;
     let least = grid.least_step();

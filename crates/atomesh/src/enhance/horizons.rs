@@ -7,10 +7,10 @@
 //! 3. their strength over that of the amplitudes about them, so that weak deep reflections count;
 //! 4. groups of crests that are strong somewhere, nowhere faint, and large enough.
 
-use super::EnhanceError;
 use super::crest::{Crest, connected};
-use super::crossings::{Row, Unit, crossings, scale_strengths};
+use super::crossings::{Polarity, Row, Unit, crossings, scale_strengths};
 use super::ridges::least_count;
+use super::{EnhanceError, LEAST_EDGE_SCALE, LONGEST, MOST_EXTENT, within};
 use crate::image::{CellAverages, Entries, Grid, Stencil, Stream, StructureTensor};
 use crate::watch::{Phase, Watch, check};
 use serde::{Deserialize, Serialize};
@@ -19,25 +19,11 @@ use serde::{Deserialize, Serialize};
 /// as loud as layers.
 const LEAST_DEVIATION: f32 = 0.005;
 
-/// Which reflections are horizons.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
-#[serde(rename_all = "lowercase")]
-#[non_exhaustive]
-pub enum Polarity {
-    /// Where amplitudes are greatest.
-    #[default]
-    Peaks,
-    /// Where amplitudes are least.
-    Troughs,
-    /// Both.
-    Both,
-}
-
 /// How horizons are found.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(default, deny_unknown_fields, rename_all = "kebab-case")]
 pub struct HorizonOptions {
-    /// Which reflections. Default: peaks.
+    /// Which reflections: peaks (bright), troughs (dark) or both. Default: peaks.
     pub polarity: Polarity,
     /// Standard deviation of the Gaussian whose derivatives are taken, in least steps. Default 1: reflections are a few
     /// samples apart.
@@ -70,6 +56,22 @@ impl Default for HorizonOptions {
     }
 }
 
+impl HorizonOptions {
+    /// Refuses what is out of range.
+    fn check(&self) -> Result<(), EnhanceError> {
+        within(
+            "horizons",
+            &[
+                ("scale", self.scale, LEAST_EDGE_SCALE, LONGEST),
+                ("normal-scale", self.normal_scale, LEAST_EDGE_SCALE, LONGEST),
+                ("low", self.low.into(), 0.0, 1.0),
+                ("high", self.high.into(), 0.0, 1.0),
+                ("least-length", self.least_length, 0.0, MOST_EXTENT),
+            ],
+        )
+    }
+}
+
 /// The amplitudes and their squares.
 struct Level;
 
@@ -88,16 +90,18 @@ impl<const D: usize> Entries<D> for Level {
 /// The horizons of seismic amplitudes, which are finite; none if they are all the same.
 ///
 /// # Errors
-/// [`EnhanceError::Cancelled`] if the watch ends the work.
+/// [`EnhanceError::Option`] for an option out of its range, [`EnhanceError::Cancelled`] if the watch ends the
+/// work.
 ///
 /// # Panics
-/// If there are not as many values as the grid's shape says, or a scale is out of its range.
+/// If there are not as many values as the grid's shape says.
 pub(crate) fn horizons<const D: usize>(
     values: &[f32],
     grid: &Grid<D>,
     options: &HorizonOptions,
     watch: &mut dyn Watch,
 ) -> Result<Vec<Crest<D>>, EnhanceError> {
+    options.check()?;
     let Some(unit) = Unit::new(values) else { return Ok(Vec::new()) };
     check(watch, Phase::Potential, 0.0, None)?;
     let least = grid.least_step();
@@ -117,8 +121,8 @@ pub(crate) fn horizons<const D: usize>(
         for (x, &value) in row.average.iter().enumerate() {
             let mean = level.at(0, x);
             let sign = if value < mean { -1.0 } else { 1.0 };
-            if options.polarity == Polarity::Peaks && sign < 0.0
-                || options.polarity == Polarity::Troughs && sign > 0.0
+            if options.polarity == Polarity::Bright && sign < 0.0
+                || options.polarity == Polarity::Dark && sign > 0.0
             {
                 continue;
             }
@@ -160,7 +164,7 @@ mod tests {
 
     fn are_peaks<const D: usize>(grid: Grid<D>, normal: [f64; D]) {
         let values = layers(&grid, normal, |_| 1.0);
-        for (polarity, phase) in [(Polarity::Peaks, 0.0), (Polarity::Troughs, 4.0)] {
+        for (polarity, phase) in [(Polarity::Bright, 0.0), (Polarity::Dark, 4.0)] {
             let options = HorizonOptions { polarity, ..Default::default() };
             let crests = horizons(&values, &grid, &options, &mut Silent).unwrap();
             let mut count = 0;
@@ -217,8 +221,7 @@ mod tests {
             };
             horizons(&values, &grid, &options, &mut Silent).unwrap().len()
         };
-        let [peaks, troughs, both] =
-            [Polarity::Peaks, Polarity::Troughs, Polarity::Both].map(count);
+        let [peaks, troughs, both] = [Polarity::Bright, Polarity::Dark, Polarity::Both].map(count);
         assert!(peaks > 0 && troughs > 0 && both == peaks + troughs);
     }
 

@@ -1,7 +1,9 @@
 //! From an image to the potential b(x): −1 in features, 0 elsewhere.
 //!
-//! Features are dark, bright or edges. What counts as background and as a full feature is read off
-//! the distribution of the samples, so that a few odd ones do not decide:
+//! Two ways lead there. Ridges, faults, horizons and the crests of edges are lines and sheets found one by one and
+//! widened to valleys of one depth and width, each in its own module; the others are the image, scaled. What
+//! counts there as background and as a full feature is read off the distribution of the samples, so that a
+//! few odd ones do not decide:
 //! - *dark*, *bright*: the background is the median, which most samples of an image of thin
 //!   features are near; a full feature is where only 2 % of the samples on the feature's side of
 //!   the median are more extreme. The share is taken of that side, not of all samples, so that
@@ -36,8 +38,12 @@ use scale::{Ramp, UnitSamples};
 use serde::{Deserialize, Serialize};
 use std::str::FromStr;
 
+use crest::{Crest, widen};
+
+pub use crossings::Polarity;
 pub use edge_crests::EdgeCrestOptions;
-pub use horizons::{HorizonOptions, Polarity};
+pub use faults::FaultOptions;
+pub use horizons::HorizonOptions;
 pub use ridges::RidgeOptions;
 
 /// Of all samples, the share whose gradient is clipped to −1.
@@ -66,16 +72,32 @@ pub enum Features {
     Edges,
     /// Places where labels meet: the samples are names, not amounts.
     Labels,
+    /// The middles of lines and sheets that are brighter or darker than what is about them
+    /// ([`FeatureOptions::ridges`]), thinned to valleys of one depth and width (Hale 2002).
+    Ridges,
+    /// Faults in seismic amplitudes ([`FeatureOptions::faults`]), thinned alike. Depth is the last axis.
+    Faults,
+    /// Reflections in seismic amplitudes ([`FeatureOptions::horizons`]), thinned alike.
+    Horizons,
     /// Nothing: b = 0, and the mesh is as regular as it can be.
     None,
 }
 
 impl Features {
     /// The names of all kinds.
-    pub const NAMES: [&str; 5] = ["dark", "bright", "edges", "labels", "none"];
+    pub const NAMES: [&str; 8] =
+        ["dark", "bright", "edges", "ridges", "faults", "horizons", "labels", "none"];
 
-    const ALL: [Self; Self::NAMES.len()] =
-        [Self::Dark, Self::Bright, Self::Edges, Self::Labels, Self::None];
+    const ALL: [Self; Self::NAMES.len()] = [
+        Self::Dark,
+        Self::Bright,
+        Self::Edges,
+        Self::Ridges,
+        Self::Faults,
+        Self::Horizons,
+        Self::Labels,
+        Self::None,
+    ];
 
     /// The name on the command line.
     pub fn name(self) -> &'static str {
@@ -84,6 +106,9 @@ impl Features {
             Self::Bright => "bright",
             Self::Edges => "edges",
             Self::Labels => "labels",
+            Self::Ridges => "ridges",
+            Self::Faults => "faults",
+            Self::Horizons => "horizons",
             Self::None => "none",
         }
     }
@@ -107,6 +132,9 @@ pub enum EdgeOperator {
     Gaussian,
     /// The paper's: 3 × 3 (× 3) differences. Sharper, and noisier.
     Prewitt,
+    /// Derivatives of a Gaussian as wide as the noise asks for, thinned to where they are steepest, and widened
+    /// to valleys of one depth and width ([`FeatureOptions::crests`]).
+    Crest,
 }
 
 /// How an image becomes a potential.
@@ -129,7 +157,18 @@ pub struct FeatureOptions {
     /// for dark and bright features, which rounds off the steps of one sample that atoms would catch
     /// on (measured on fault images: better shape and better alignment); none for edges, which the
     /// operator has smoothed. Smoothing that reaches beyond the features' width costs alignment.
+    /// Of features that are thinned (ridges, faults, horizons, edges by their crests) it is the width of the valleys
+    /// made of them, −exp(−s²/2σ²) at the distance s, no less than 0.7 samples; their depth stays 1. Default: the
+    /// least step.
     pub smooth: Option<f64>,
+    /// How ridges are found.
+    pub ridges: RidgeOptions,
+    /// How faults are found.
+    pub faults: FaultOptions,
+    /// How horizons are found.
+    pub horizons: HorizonOptions,
+    /// How edges are found by [`EdgeOperator::Crest`].
+    pub crests: EdgeCrestOptions,
     /// Negates b, so that atoms keep off features and line up alongside them. Default false.
     pub repel: bool,
     /// The lattice units of `smooth` and of gradients. Default: physical.
@@ -143,6 +182,10 @@ impl Default for FeatureOptions {
             edge_operator: EdgeOperator::default(),
             edge_scale: 1.5,
             smooth: None,
+            ridges: RidgeOptions::default(),
+            faults: FaultOptions::default(),
+            horizons: HorizonOptions::default(),
+            crests: EdgeCrestOptions::default(),
             repel: false,
             units: Units::default(),
         }
@@ -157,7 +200,16 @@ impl FeatureOptions {
             (None, Features::Dark | Features::Bright) => {
                 grid.step.map(|step| ROUNDED * grid.least_step() / step)
             }
-            (None, Features::Edges | Features::Labels | Features::None) => [0.0; D],
+            (None, _) => [0.0; D],
+        }
+    }
+
+    /// Whether features are thinned to crests, and widened again.
+    fn thins(&self) -> bool {
+        match self.features {
+            Features::Ridges | Features::Faults | Features::Horizons => true,
+            Features::Edges => self.edge_operator == EdgeOperator::Crest,
+            _ => false,
         }
     }
 }
@@ -213,16 +265,18 @@ pub enum EnhanceError {
         /// How many different samples there are.
         count: usize,
     },
-    /// An option of the search for faults is out of its range.
-    #[error("{option} of faults is {value}; expected {least} to {most}")]
-    FaultOption {
-        /// The option's name.
+    /// An option of how crests are found is out of its range.
+    #[error("{option} of {kind} is {value}; expected {least} to {most}")]
+    Option {
+        /// What is searched for.
+        kind: &'static str,
+        /// The option.
         option: &'static str,
-        /// The value found.
+        /// Its value.
         value: f64,
-        /// The least value.
+        /// The least that it may be.
         least: f64,
-        /// The greatest value.
+        /// The greatest that it may be.
         most: f64,
     },
     /// The watch ended the work.
@@ -271,11 +325,12 @@ pub fn enhance<const D: usize>(
     let zeros = || vec![0.0; unit.len()];
     let shown = match options.features {
         Features::Labels => return labelled(image, options, watch),
+        _ if options.thins() => return thinned(image, options, watch),
         Features::None => None,
         _ if unit.is_constant() => None,
         Features::Dark => Some((zeros(), Ramp::dark(&unit))),
         Features::Bright => Some((zeros(), Ramp::bright(&unit))),
-        Features::Edges => edges(&unit, image, options, watch)?,
+        _ => edges(&unit, image, options, watch)?,
     };
     check(watch, Phase::Potential, 0.8, None)?;
     let constant = shown.is_none() && options.features != Features::None;
@@ -305,6 +360,40 @@ pub fn enhance<const D: usize>(
     }
     check(watch, Phase::Potential, 1.0, None)?;
     Ok(Enhanced { values, constant })
+}
+
+/// The potential of features that are thinned to crests: valleys of one depth and width.
+fn thinned<const D: usize>(
+    image: &Image<D>,
+    options: &FeatureOptions,
+    watch: &mut dyn Watch,
+) -> Result<Enhanced, EnhanceError> {
+    let grid = image.frame().grid(options.units);
+    let width = match options.smooth {
+        Some(width) if width > 0.0 => width,
+        _ => ROUNDED * grid.least_step(),
+    };
+    let copied;
+    let values = match image.samples() {
+        Samples::F32(values) => values,
+        other => {
+            copied = other.to_f32();
+            &copied
+        }
+    };
+    let crests: Vec<Crest<D>> = match options.features {
+        Features::Ridges => ridges::ridges(values, &grid, &options.ridges, watch)?,
+        Features::Faults => faults::faults(values, &grid, &options.faults, watch)?,
+        Features::Horizons => horizons::horizons(values, &grid, &options.horizons, watch)?,
+        _ => edge_crests::edge_crests(values, &grid, &options.crests, watch)?,
+    };
+    check(watch, Phase::Potential, 0.9, None)?;
+    let mut values = widen(&crests, &grid, width);
+    if options.repel {
+        values.par_iter_mut().for_each(|b| *b = -*b + 0.0);
+    }
+    check(watch, Phase::Potential, 1.0, None)?;
+    Ok(Enhanced { values, constant: crests.is_empty() })
 }
 
 /// The potential of a label image: valleys of one depth where labels meet.
@@ -344,6 +433,25 @@ pub fn given_potential(samples: Samples) -> Result<Vec<f32>, EnhanceError> {
     }
 }
 
+/// The widest that Gaussians and reaches may be, in samples: beyond it nothing of an image is left.
+const LONGEST: f64 = 1000.0;
+
+/// The longest that a feature may have to be, in samples.
+const MOST_EXTENT: f64 = 1e6;
+
+/// Refuses the first of some options that is not within its range, ends included: name, value, least and most.
+fn within(
+    kind: &'static str,
+    ranges: &[(&'static str, f64, f64, f64)],
+) -> Result<(), EnhanceError> {
+    for &(option, value, least, most) in ranges {
+        if !(least..=most).contains(&value) {
+            return Err(EnhanceError::Option { kind, option, value, least, most });
+        }
+    }
+    Ok(())
+}
+
 fn check_options(options: &FeatureOptions) -> Result<(), EnhanceError> {
     let (scale, smooth) = (options.edge_scale, options.smooth.unwrap_or(0.0));
     if !(scale.is_finite() && scale >= LEAST_EDGE_SCALE) {
@@ -364,7 +472,7 @@ fn edges<const D: usize>(
 ) -> Result<Option<(Vec<f32>, Ramp)>, EnhanceError> {
     let stencil = match options.edge_operator {
         EdgeOperator::Prewitt => Stencil::Prewitt,
-        EdgeOperator::Gaussian => Stencil::Gaussian(options.edge_scale),
+        EdgeOperator::Gaussian | EdgeOperator::Crest => Stencil::Gaussian(options.edge_scale),
     };
     let mut grid = image.frame().grid(options.units);
     // only the steps' ratios matter, and ratios are safe in single precision

@@ -11,9 +11,9 @@
 //! The background is the median; a full feature is as bright as the 98th percentile of all crests. Departure
 //! from Hale: crossings are found between samples, so that what is made of them is alike at any slant.
 
-use super::EnhanceError;
 use super::crest::{Crest, connected};
-use super::crossings::{Unit, crossings, scale_strengths};
+use super::crossings::{Polarity, Unit, crossings, scale_strengths};
+use super::{EnhanceError, LEAST_EDGE_SCALE, LONGEST, MOST_EXTENT, within};
 use crate::geometry::linear::largest_eigenpair;
 use crate::image::{Grid, StructureTensor};
 use crate::watch::{Phase, Watch, check};
@@ -23,8 +23,8 @@ use serde::{Deserialize, Serialize};
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(default, deny_unknown_fields, rename_all = "kebab-case")]
 pub struct RidgeOptions {
-    /// Whether features are darker than what is about them; else they are brighter.
-    pub dark: bool,
+    /// Which ridges: those brighter or darker than what is about them, or both. Default: bright.
+    pub polarity: Polarity,
     /// Standard deviation of the Gaussian whose derivatives are taken, in least steps. Default 1.5: as wide as
     /// features of three samples, and blind to what is finer. Hale's (2002) is 3.
     pub scale: f64,
@@ -41,7 +41,24 @@ pub struct RidgeOptions {
 
 impl Default for RidgeOptions {
     fn default() -> Self {
-        Self { dark: true, scale: 1.5, normal_scale: 12.0, low: 0.3, high: 0.5, least_length: 10.0 }
+        let polarity = Polarity::default();
+        Self { polarity, scale: 1.5, normal_scale: 12.0, low: 0.3, high: 0.5, least_length: 10.0 }
+    }
+}
+
+impl RidgeOptions {
+    /// Refuses what is out of range.
+    fn check(&self) -> Result<(), EnhanceError> {
+        within(
+            "ridges",
+            &[
+                ("scale", self.scale, LEAST_EDGE_SCALE, LONGEST),
+                ("normal-scale", self.normal_scale, 0.0, LONGEST),
+                ("low", self.low.into(), 0.0, 1.0),
+                ("high", self.high.into(), 0.0, 1.0),
+                ("least-length", self.least_length, 0.0, MOST_EXTENT),
+            ],
+        )
     }
 }
 
@@ -53,26 +70,28 @@ pub(super) fn least_count<const D: usize>(length: f64) -> usize {
 /// The ridges of an image of finite values; none if it is constant.
 ///
 /// # Errors
-/// [`EnhanceError::Cancelled`] if the watch ends the work.
+/// [`EnhanceError::Option`] for an option out of its range, [`EnhanceError::Cancelled`] if the watch ends the
+/// work.
 ///
 /// # Panics
-/// If there are not as many values as the grid's shape says, or a scale is out of its range.
+/// If there are not as many values as the grid's shape says.
 pub(crate) fn ridges<const D: usize>(
     values: &[f32],
     grid: &Grid<D>,
     options: &RidgeOptions,
     watch: &mut dyn Watch,
 ) -> Result<Vec<Crest<D>>, EnhanceError> {
+    options.check()?;
     let Some(unit) = Unit::new(values) else { return Ok(Vec::new()) };
     check(watch, Phase::Potential, 0.0, None)?;
     let least = grid.least_step();
     let grid = Grid { step: grid.step.map(|step| step / least), ..*grid };
-    let sign = if options.dark { -1.0 } else { 1.0 };
-    let background = unit.quantile(0.5);
-    let fill = |start: usize, out: &mut [f32]| {
-        unit.fill(start, out);
-        out.iter_mut().for_each(|v| *v = sign * (*v - background));
+    let signs: &[f32] = match options.polarity {
+        Polarity::Bright => &[1.0],
+        Polarity::Dark => &[-1.0],
+        Polarity::Both => &[1.0, -1.0],
     };
+    let background = unit.quantile(0.5);
     let smooth = grid.step.map(|step| options.normal_scale / step);
     let tensor = if options.normal_scale > 0.0 {
         Some(StructureTensor::new(values, &grid, options.scale, smooth, watch)?)
@@ -94,7 +113,14 @@ pub(crate) fn ridges<const D: usize>(
             }
         }
     };
-    let mut crests = crossings(fill, &grid, options.scale, visit, watch)?;
+    let mut crests = Vec::new();
+    for sign in signs {
+        let fill = |start: usize, out: &mut [f32]| {
+            unit.fill(start, out);
+            out.iter_mut().for_each(|v| *v = sign * (*v - background));
+        };
+        crests.extend(crossings(fill, &grid, options.scale, visit, watch)?);
+    }
     scale_strengths(&mut crests);
     let least = least_count::<D>(options.least_length);
     Ok(connected(crests, grid.shape, options.low, options.high, least))
@@ -139,7 +165,7 @@ mod tests {
         let values: Vec<f32> = (0..grid.sample_count())
             .map(|i| (-0.5 * (across_middle(&grid, normal, i) / width).powi(2)).exp() as f32)
             .collect();
-        let options = RidgeOptions { dark: false, normal_scale, ..Default::default() };
+        let options = RidgeOptions { normal_scale, ..Default::default() };
         let crests = found(&values, &grid, &options);
         let inner = |k: usize, i: usize| (7..grid.shape[k] - 7).contains(&i);
         let mut count = 0;
@@ -213,8 +239,8 @@ mod tests {
         let dark = ring(51);
         let bright: Vec<f32> = dark.iter().map(|v| 5.0 - v).collect();
         let options = RidgeOptions { normal_scale: 2.0, ..Default::default() };
-        let [a, b] = [(&dark, true), (&bright, false)]
-            .map(|(values, dark)| found(values, &grid, &RidgeOptions { dark, ..options }));
+        let [a, b] = [(&dark, Polarity::Dark), (&bright, Polarity::Bright)]
+            .map(|(values, polarity)| found(values, &grid, &RidgeOptions { polarity, ..options }));
         assert!(!a.is_empty() && a.len() == b.len());
         for (a, b) in a.iter().zip(&b) {
             assert_eq!(a.index, b.index);
@@ -230,7 +256,7 @@ mod tests {
         let values: Vec<f32> =
             (0..1800).map(|i| if on(i % 60, i / 60) { 1.0 } else { 0.0 }).collect();
         let options = RidgeOptions {
-            dark: false,
+            polarity: Polarity::Bright,
             normal_scale: 4.0,
             least_length: 20.0,
             ..Default::default()

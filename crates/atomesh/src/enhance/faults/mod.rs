@@ -39,8 +39,8 @@ mod judge;
 #[cfg(test)]
 mod tests;
 
-use super::EnhanceError;
 use super::crest::{Crest, connected};
+use super::{EnhanceError, LONGEST, MOST_EXTENT, within};
 use crate::image::Grid;
 use crate::watch::{Phase, Watch, check};
 use facing::Facing;
@@ -75,7 +75,7 @@ pub struct FaultOptions {
     pub high: f64,
     /// Least extent of a fault in samples: so many crests in a section, their square in a volume.
     /// Default 20: single noisy groups are smaller, and what is smaller cuts few layers.
-    pub extent: f64,
+    pub least_length: f64,
 }
 
 impl Default for FaultOptions {
@@ -88,13 +88,10 @@ impl Default for FaultOptions {
             background: 1.25,
             low: 0.1,
             high: 0.5,
-            extent: 20.0,
+            least_length: 20.0,
         }
     }
 }
-
-/// The longest reach: beyond it nothing of an image is left.
-const LONGEST: f64 = 1000.0;
 
 impl FaultOptions {
     /// Refuses what is out of range.
@@ -107,14 +104,9 @@ impl FaultOptions {
             ("background", self.background, 0.0, LONGEST),
             ("low", self.low, 0.0, 1.0),
             ("high", self.high, 0.0, 1.0),
-            ("extent", self.extent, 0.0, 1e6),
+            ("least-length", self.least_length, 0.0, MOST_EXTENT),
         ];
-        for (option, value, least, most) in ranges {
-            if !(least..=most).contains(&value) {
-                return Err(EnhanceError::FaultOption { option, value, least, most });
-            }
-        }
-        Ok(())
+        within("faults", &ranges)
     }
 }
 
@@ -152,7 +144,7 @@ pub(crate) fn faults<const D: usize>(
     check(watch, Phase::Potential, 0.9, None)?;
     let crests = thin::thin(found, grid, options);
     check(watch, Phase::Potential, 0.95, None)?;
-    let least = options.extent.powi(D as i32 - 1) as usize;
+    let least = options.least_length.powi(D as i32 - 1) as usize;
     let kept = connected(crests, grid.shape, options.low as f32, options.high as f32, least);
     check(watch, Phase::Potential, 1.0, None)?;
     Ok(kept)

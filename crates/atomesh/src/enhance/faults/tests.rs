@@ -163,7 +163,8 @@ fn folded_layers_without_faults_have_none() {
     assert_eq!(found(&section, [160, 120]), []);
     assert_eq!(found(&volume, [56, 52, 60]), []);
     // in noise some groups may pass for a fault; one through the whole section has 120 crests
-    let count = |decibels, seed| found(&with_noise(section.clone(), decibels, seed), [160, 120]).len();
+    let count =
+        |decibels, seed| found(&with_noise(section.clone(), decibels, seed), [160, 120]).len();
     let quiet: Vec<usize> = (0..6).map(|seed| count(10.0, seed)).collect();
     let loud: Vec<usize> = (0..6).map(|seed| count(3.0, seed)).collect();
     println!("crests without faults: {quiet:?} at 10 dB, {loud:?} at 3 dB");
@@ -208,7 +209,7 @@ fn alike<const D: usize>(a: &[Crest<D>], b: &[Crest<D>], near: f32) -> f64 {
 #[test]
 fn mirrored_layers_have_mirrored_faults() {
     let shape = [128, 128];
-    let (values, _) = super::judge::noisy(Scene::Section, shape, 1, 10.0);
+    let (values, _) = judge::noisy(Scene::Section, shape, 1, 10.0);
     let crests = found(&values, shape);
     let mirrored: Vec<f32> = values.chunks(128).flat_map(|row| row.iter().rev().copied()).collect();
     let mut back = found(&mirrored, shape);
@@ -258,7 +259,7 @@ fn spacing_turns_normals_and_nothing_else() {
 #[test]
 fn bits_do_not_depend_on_the_number_of_threads() {
     fn same<const D: usize>(scene: Scene, shape: [usize; D]) {
-        let (values, _) = super::judge::noisy(scene, shape, 2, 3.0);
+        let (values, _) = judge::noisy(scene, shape, 2, 3.0);
         let run = |threads| {
             let pool = ThreadPoolBuilder::new().num_threads(threads).build().unwrap();
             pool.install(|| found(&values, shape))
@@ -337,7 +338,7 @@ proptest! {
             let count: usize = shape.iter().product();
             let values: Vec<f32> =
                 (0..count).map(|_| magnitude * (random.random::<f32>() - 0.5)).collect();
-            let options = FaultOptions { low: 0.0, high: 0.0, extent: 0.0, ..Default::default() };
+            let options = FaultOptions { low: 0.0, high: 0.0, least_length: 0.0, ..Default::default() };
             for crest in faults(&values, &unit(shape), &options, &mut Silent).unwrap() {
                 let sample = coordinates(crest.index, shape);
                 assert!((0..D).all(|k| (crest.point[k] - sample[k] as f32).abs() <= 0.5));
