@@ -291,17 +291,26 @@ impl<const D: usize> Row<'_, D> {
     /// How far along a normal from sample `x` the slope along it is greatest, and how great; `None` if it is
     /// not near, or the slope at the sample or a neighbour is not uphill.
     ///
-    /// The top of a parabola through the logarithms of slopes at the sample and its neighbours, which are taken to
-    /// change along the normal only: exact for the bell that a smoothed step's slope is.
+    /// The top of a parabola, along the normal, through the logarithms of slopes at the sample and its neighbours, also those at
+    /// corners: exact for the bell that a smoothed step's slope is.
     pub(super) fn steepest(&self, normal: &[f32; D], x: usize) -> Option<(f32, f32)> {
         let log = |steps| self.slope(normal, x, steps).ln(); // NaN is caught below
+        let weights: [f32; D] = std::array::from_fn(|k| normal[k] / self.grid.step[k] as f32);
         let here = log([0; D]);
         let (mut rise, mut bend) = (0.0, 0.0);
         for k in 0..D {
             let [less, more] = [-1, 1].map(|by| log(step::<D>(k, by)));
-            let width = self.grid.step[k] as f32;
-            rise += normal[k] * (more - less) / (2.0 * width);
-            bend += (more - 2.0 * here + less) / (width * width);
+            rise += 0.5 * weights[k] * (more - less);
+            bend += weights[k] * weights[k] * (more - 2.0 * here + less);
+            for l in 0..k {
+                let corner = |a, b| {
+                    let mut steps = step::<D>(k, a);
+                    steps[l] = b;
+                    log(steps)
+                };
+                let mixed = corner(1, 1) - corner(1, -1) - corner(-1, 1) + corner(-1, -1);
+                bend += 0.5 * weights[k] * weights[l] * mixed;
+            }
         }
         let offset = -rise / bend;
         (bend < 0.0 && offset.is_finite()).then(|| (offset, (here + 0.5 * rise * offset).exp()))
