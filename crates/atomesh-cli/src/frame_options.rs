@@ -156,8 +156,8 @@ pub fn read(
         let failure = Failure::content(message).about(path);
         return Err(failure.advise("crop or resample the image first"));
     }
-    read_image(path, &ReadOptions { raw }, watch).map_err(|ReadError { path, reason, .. }| {
-        match reason {
+    read_image(path, &ReadOptions { raw, ..ReadOptions::default() }, watch).map_err(
+        |ReadError { path, reason, .. }| match reason {
             ReadReason::Cancelled(_) => Failure::cancelled(),
             ReadReason::UnknownExtension { .. } => Failure::misuse(&reason)
                 .about(&path)
@@ -169,6 +169,6 @@ pub fn read(
                 Failure::misuse(&reason).about(&path)
             }
             _ => Failure::content(&reason).about(&path),
-        }
-    })
+        },
+    )
 }

@@ -117,7 +117,12 @@ fn raw_files_need_a_layout() {
         byte_order: ByteOrder::Little,
         offset: 0,
     };
-    let image = read_image(&other, &ReadOptions { raw: Some(layout) }, &mut Silent).unwrap();
+    let image = read_image(
+        &other,
+        &ReadOptions { raw: Some(layout), ..ReadOptions::default() },
+        &mut Silent,
+    )
+    .unwrap();
     assert_eq!(image.shape(), [3, 2]);
 }
 

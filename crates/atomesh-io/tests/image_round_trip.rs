@@ -163,7 +163,7 @@ fn the_nifti_crate_reads_what_is_written() {
 
 fn write_and_read(path: &Path, image: &Image<3>, raw: Option<RawLayout>) -> AnyImage {
     write_image(path, image, &mut Silent).unwrap();
-    read_image(path, &ReadOptions { raw }, &mut Silent).unwrap()
+    read_image(path, &ReadOptions { raw, ..ReadOptions::default() }, &mut Silent).unwrap()
 }
 
 proptest! {

@@ -30,6 +30,14 @@ pub enum ReadReason {
     /// The system refused to open or read the file.
     #[error("cannot be read: {0}")]
     Io(io::Error),
+    /// A file that the header names as that of its samples cannot be read.
+    #[error("its data file {} cannot be read: {error}", path.display())]
+    DataFile {
+        /// The file, as the header names it.
+        path: PathBuf,
+        /// What the system said.
+        error: io::Error,
+    },
     /// The file's name ends like no format that is known.
     #[error(
         "no image format is known by the ending {extension:?}; known are {}, and any file as raw \
@@ -146,6 +154,38 @@ pub enum ReadReason {
     RawShape {
         /// Samples along the axes given.
         shape: Vec<usize>,
+    },
+    /// Two traces of a seismic file have the same numbers.
+    #[error(
+        "traces {first} and {second} both are {number}; expected one trace for each: stack them, or \
+         say where their numbers stand"
+    )]
+    DuplicateTraces {
+        /// The first of the two, from 1.
+        first: usize,
+        /// The second.
+        second: usize,
+        /// What they both are, as in `inline 12, crossline 34`.
+        number: String,
+    },
+    /// The numbers of traces span a grid that is nearly empty.
+    #[error(
+        "{traces} traces have {numbers}, a grid of {places} places; expected a trace at every 16th \
+         or more: say where their numbers stand"
+    )]
+    SparseTraces {
+        /// The traces in the file.
+        traces: usize,
+        /// The places of the grid.
+        places: u128,
+        /// Their numbers, as in `inlines 1 to 100, crosslines 1 to 100`.
+        numbers: String,
+    },
+    /// A place in a trace header lies outside of it.
+    #[error("byte {byte} of a trace header; expected 1 to 237, where numbers of 4 bytes can begin")]
+    TraceByte {
+        /// The place given, from 1.
+        byte: usize,
     },
     /// The samples do not fit into memory.
     #[error("no memory for {bytes} bytes of samples; crop or resample the image")]

@@ -10,6 +10,8 @@
 //! | TIFF | tif tiff | integers, floats; many pages are a volume | none |
 //! | NPY | npy | every real type; arrays (y, x) or (z, y, x) | none |
 //! | NIfTI-1 | nii nii.gz | every real type; one volume | sform, else qform, else spacing |
+//! | SEG-Y | sgy segy | IBM and IEEE floats, integers; lines and cubes | by coordinates and interval |
+//! | RSF | rsf | floats, integers; native, XDR, ASCII | o and d of each axis |
 //! | raw | raw, or any with a layout | every real type | none |
 //!
 //! An image without a frame has unit spacing and origin 0: the resolution that a PNG, JPEG or TIFF
@@ -28,17 +30,23 @@ use crate::atomic_file::AtomicFile;
 
 mod error;
 mod nifti;
+mod note;
 mod npy;
 mod raster;
 mod raw;
+mod rsf;
 mod sample_type;
+mod segy;
 mod stream;
 mod tiff;
+mod traces;
 mod watched;
 
 pub use error::{ReadError, ReadReason, WriteError, WriteReason};
+pub use note::{LoadedImage, ReadNote};
 pub use raw::RawLayout;
 pub use sample_type::{ByteOrder, SampleType, UnknownByteOrder, UnknownSampleType};
+pub use segy::{SegyOptions, Vertical};
 use watched::Watched;
 
 /// An image whose file decided whether it is flat or a volume.
@@ -129,15 +137,19 @@ pub enum ImageFormat {
     Nifti,
     /// The same compressed by gzip, `.nii.gz`.
     NiftiGz,
+    /// SEG-Y, revisions 0 to 2.
+    Segy,
+    /// Madagascar's regularly sampled format.
+    Rsf,
     /// Samples and nothing else.
     Raw,
 }
 
 impl ImageFormat {
     /// The endings by which formats are known.
-    pub const EXTENSIONS: [&str; 14] = [
+    pub const EXTENSIONS: [&str; 17] = [
         ".png", ".jpg", ".jpeg", ".pnm", ".pgm", ".ppm", ".pbm", ".pam", ".tif", ".tiff", ".npy",
-        ".nii", ".nii.gz", ".raw",
+        ".nii", ".nii.gz", ".sgy", ".segy", ".rsf", ".raw",
     ];
 
     /// The format that a file's name promises, in upper or lower case; none if it is not known.
@@ -150,6 +162,8 @@ impl ImageFormat {
             ".npy" => Self::Npy,
             ".nii" => Self::Nifti,
             ".nii.gz" => Self::NiftiGz,
+            ".sgy" | ".segy" => Self::Segy,
+            ".rsf" => Self::Rsf,
             ".raw" => Self::Raw,
             _ => return None,
         })
@@ -168,7 +182,7 @@ impl ImageFormat {
             Self::Npy => head.starts_with(b"\x93NUMPY"),
             Self::Nifti => !head.starts_with(b"\x1f\x8b"),
             Self::NiftiGz => head.starts_with(b"\x1f\x8b"),
-            Self::Raw => true,
+            Self::Segy | Self::Rsf | Self::Raw => true,
         }
     }
 }
@@ -183,6 +197,8 @@ impl fmt::Display for ImageFormat {
             Self::Npy => "NPY",
             Self::Nifti => "NIfTI-1",
             Self::NiftiGz => "gzipped NIfTI-1",
+            Self::Segy => "SEG-Y",
+            Self::Rsf => "RSF",
             Self::Raw => "raw",
         })
     }
@@ -206,6 +222,8 @@ pub struct ReadOptions {
     /// The layout of raw samples; if given, the file is read as raw whatever its name is.
     /// Default: none.
     pub raw: Option<RawLayout>,
+    /// What a SEG-Y file may not say; of RSF files, whether the first axis is vertical.
+    pub segy: SegyOptions,
 }
 
 /// Reads an image from a file, in the format that its name promises.
@@ -229,6 +247,19 @@ pub fn read_image(
     options: &ReadOptions,
     watch: &mut dyn Watch,
 ) -> Result<AnyImage, ReadError> {
+    load_image(path, options, watch).map(|loaded| loaded.image)
+}
+
+/// Reads an image with the units of its axes and what its reader has to say about it, such as traces
+/// that are missing; as [`read_image`].
+///
+/// # Errors
+/// As [`read_image`].
+pub fn load_image(
+    path: &Path,
+    options: &ReadOptions,
+    watch: &mut dyn Watch,
+) -> Result<LoadedImage, ReadError> {
     let mut read = || {
         let format = match (&options.raw, ImageFormat::from_path(path)) {
             (Some(_), _) => ImageFormat::Raw,
@@ -242,7 +273,8 @@ pub fn read_image(
         if metadata.is_dir() {
             return Err(ReadReason::Io(std::io::ErrorKind::IsADirectory.into()));
         }
-        decode(file, metadata.len(), format, options, watch)
+        let file = Source { bytes: file, length: metadata.len(), folder: Some(folder_of(path)) };
+        decode(file, format, options, watch)
     };
     read().map_err(|reason| ReadError { path: path.into(), reason })
 }
@@ -257,17 +289,32 @@ pub fn decode_image(
     options: &ReadOptions,
     watch: &mut dyn Watch,
 ) -> Result<AnyImage, ReadReason> {
-    decode(Cursor::new(bytes), bytes.len() as u64, format, options, watch)
+    let source = Source { bytes: Cursor::new(bytes), length: bytes.len() as u64, folder: None };
+    decode(source, format, options, watch).map(|loaded| loaded.image)
 }
 
-/// Reads an image of `file_bytes` bytes in all.
+/// Where an image is read from.
+struct Source<'a, R> {
+    bytes: R,
+    /// The number of bytes in all.
+    length: u64,
+    /// The folder in which other files of the image stand, if it is known.
+    folder: Option<&'a Path>,
+}
+
+/// The folder of a file.
+fn folder_of(path: &Path) -> &Path {
+    path.parent().unwrap_or(Path::new(""))
+}
+
+/// Reads an image.
 fn decode<R: Read + Seek>(
-    mut source: R,
-    file_bytes: u64,
+    source: Source<R>,
     format: ImageFormat,
     options: &ReadOptions,
     watch: &mut dyn Watch,
-) -> Result<AnyImage, ReadReason> {
+) -> Result<LoadedImage, ReadReason> {
+    let Source { bytes: mut source, length: file_bytes, folder } = source;
     if file_bytes == 0 {
         return Err(ReadReason::Empty { format });
     }
@@ -281,6 +328,15 @@ fn decode<R: Read + Seek>(
     let cancelled = Cell::new(false);
     let source = Watched::new(source, file_bytes, watch, &cancelled);
     let image = match format {
+        // these say more than the image
+        ImageFormat::Segy => {
+            let loaded = segy::read(source, file_bytes, &options.segy);
+            return if cancelled.get() { Err(Cancelled.into()) } else { loaded };
+        }
+        ImageFormat::Rsf => {
+            let loaded = rsf::read(source, file_bytes, folder, options.segy.vertical);
+            return if cancelled.get() { Err(Cancelled.into()) } else { loaded };
+        }
         ImageFormat::Png | ImageFormat::Jpeg | ImageFormat::Pnm => {
             raster::read(source, file_bytes, format)
         }
@@ -293,7 +349,7 @@ fn decode<R: Read + Seek>(
             None => Err(ReadReason::NoRawLayout),
         },
     };
-    if cancelled.get() { Err(Cancelled.into()) } else { image }
+    if cancelled.get() { Err(Cancelled.into()) } else { image.map(LoadedImage::from) }
 }
 
 /// Writes an image in the format that the file's name promises: NPY (array (y, x) or (z, y, x)),
@@ -321,7 +377,9 @@ pub fn write_image<const D: usize>(
             ImageFormat::Nifti => nifti::write(&mut file, image, watch)?,
             ImageFormat::NiftiGz => nifti::write_gzipped(&mut file, image, watch)?,
             ImageFormat::Raw => stream::write_samples(&mut file, image.samples(), format, watch)?,
-            ImageFormat::Jpeg | ImageFormat::Pnm => return Err(unknown()),
+            ImageFormat::Jpeg | ImageFormat::Pnm | ImageFormat::Segy | ImageFormat::Rsf => {
+                return Err(unknown());
+            }
         }
         Ok(file.commit()?)
     };

@@ -61,7 +61,7 @@ mod tests {
     use atomesh::watch::Silent;
 
     fn decode(bytes: &[u8], layout: RawLayout) -> Result<AnyImage, ReadReason> {
-        let options = ReadOptions { raw: Some(layout) };
+        let options = ReadOptions { raw: Some(layout), ..ReadOptions::default() };
         decode_image(bytes, ImageFormat::Raw, &options, &mut Silent)
     }
 

@@ -119,6 +119,14 @@ fn reserve<T>(samples: &mut Vec<T>, count: usize) -> Result<(), ReadReason> {
         .map_err(|_| ReadReason::Memory { bytes: count as u128 * size_of::<T>() as u128 })
 }
 
+/// A vector of `count` zeros.
+pub(super) fn zeros<T: Copy + Default>(count: usize) -> Result<Vec<T>, ReadReason> {
+    let mut samples = Vec::new();
+    reserve(&mut samples, count)?;
+    samples.resize(count, T::default());
+    Ok(samples)
+}
+
 /// Where, x fastest, the samples belong that come z fastest.
 fn turned_places([nx, ny, nz]: [usize; 3]) -> impl Iterator<Item = usize> {
     (0..nx)

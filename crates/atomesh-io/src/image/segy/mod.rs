@@ -1,0 +1,200 @@
+//! SEG-Y, revisions 0 to 2: the seismic trade's tape format. Headers, then trace after trace.
+//!
+//! Definition: SEG Technical Standards Committee, *SEG-Y revision 2.0 Data Exchange format*, 2017;
+//! Barry, Cavers & Kneale 1975. Order of the work: the file's header and its size give the traces'
+//! length and number; all trace headers are read, the samples skipped; their numbers arrange the
+//! traces, their coordinates place the grid; then samples are read once, in blocks, into the vector
+//! that will hold them, missing traces being 0.
+//!
+//! Axes: in a cube x runs along the crossline numbers, y along the inline numbers; on a line x runs
+//! along the line. The last axis is the sample number, downwards. World coordinates are X and Y of
+//! the trace headers (on a line the distance along it, X itself where it runs along X), and time or
+//! depth downwards.
+//!
+//! The vertical spacing is a thousandth of the sample interval in the header, and so milliseconds
+//! for time (the standard has microseconds), metres for depth (by custom millimetres); only its name
+//! hangs on which is meant.
+
+use std::io::{Read, Seek, SeekFrom};
+
+use atomesh::image::{Frame, Image, Samples};
+
+use super::traces::{self, TraceLayout};
+use super::{AnyImage, ImageFormat, LoadedImage, ReadNote, ReadReason};
+
+mod fit;
+mod header;
+mod survey;
+#[cfg(test)]
+mod tests;
+mod trace;
+
+use fit::Placement;
+use header::Header;
+use survey::Survey;
+use trace::Trace;
+
+const FORMAT: ImageFormat = ImageFormat::Segy;
+
+/// Where inline and crossline numbers stand if nobody says otherwise (revision 1).
+const TRACE_BYTES: [usize; 2] = [189, 193];
+
+/// Where coordinates may be, in the order tried: of the midpoint (revision 1), the source, the
+/// receiver.
+const COORDINATE_BYTES: [[usize; 2]; 3] = [[181, 185], [73, 77], [81, 85]];
+
+/// What the vertical axis of seismic data is.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash, serde::Serialize, serde::Deserialize)]
+#[serde(rename_all = "lowercase")]
+pub enum Vertical {
+    /// Two-way time, in milliseconds.
+    Time,
+    /// Depth, in metres or feet.
+    Depth,
+}
+
+/// What a SEG-Y file may not say, or say in its own way.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub struct SegyOptions {
+    /// The first bytes, counted from 1, of the inline and the crossline number in a trace header;
+    /// one place twice makes a line. Default: 189 and 193.
+    pub trace_bytes: Option<[usize; 2]>,
+    /// The first bytes of X and Y. Default: the first of 181 and 185, 73 and 77, 81 and 85 that
+    /// vary.
+    pub coordinate_bytes: Option<[usize; 2]>,
+    /// What the samples of a trace are along. Default: unknown, which leaves its unit unnamed.
+    pub vertical: Option<Vertical>,
+}
+
+impl SegyOptions {
+    fn trace_bytes(&self) -> [usize; 2] {
+        self.trace_bytes.unwrap_or(TRACE_BYTES)
+    }
+
+    fn coordinate_bytes(&self) -> &[[usize; 2]] {
+        match &self.coordinate_bytes {
+            Some(given) => std::slice::from_ref(given),
+            None => &COORDINATE_BYTES,
+        }
+    }
+
+    /// Every number must lie in a trace header of 240 bytes.
+    fn check(&self) -> Result<(), ReadReason> {
+        let all = [self.trace_bytes, self.coordinate_bytes];
+        match all.into_iter().flatten().flatten().find(|at| !(1..=237).contains(at)) {
+            Some(byte) => Err(ReadReason::TraceByte { byte }),
+            None => Ok(()),
+        }
+    }
+}
+
+/// The error for an entry of a header.
+fn wrong(field: &'static str, value: String, expected: &'static str) -> ReadReason {
+    ReadReason::Header { format: FORMAT, field, value, expected }
+}
+
+/// Reads a line or a cube.
+pub(super) fn read<R: Read + Seek>(
+    mut source: R,
+    file_bytes: u64,
+    options: &SegyOptions,
+) -> Result<LoadedImage, ReadReason> {
+    options.check()?;
+    let header = Header::read(&mut source, file_bytes)?;
+    let heads = trace::read_headers(&mut source, &header, options)?;
+    let mut notes = Vec::new();
+    let survey = Survey::arrange(&heads, options, &mut notes)?;
+    let placement = fit::place(&heads, &survey, options.coordinate_bytes(), &mut notes);
+    let vertical = vertical(&header, &heads, options, &mut notes);
+    let length = match (placement, header.is_in_feet) {
+        (None, _) => "",
+        (_, true) => "ft",
+        (_, false) => "m",
+    };
+    if header.is_in_feet {
+        notes.push(ReadNote::Feet);
+    }
+    let depth = match options.vertical {
+        Some(Vertical::Time) => "ms",
+        Some(Vertical::Depth) if header.is_in_feet => "ft",
+        Some(Vertical::Depth) => "m",
+        None => "",
+    };
+    let [nx, ny] = survey.shape;
+    // frames are made first, so that what is wrong with them is reported before the long read
+    let (image, units) = if survey.is_cube {
+        let frame = cube_frame([nx, ny, header.samples], placement, vertical)?;
+        let samples = read_samples(&mut source, &header, &survey)?;
+        (AnyImage::Volume(Image::new(frame, samples)?), vec![length, length, depth])
+    } else {
+        let frame = line_frame([nx, header.samples], placement, vertical)?;
+        let samples = read_samples(&mut source, &header, &survey)?;
+        (AnyImage::Flat(Image::new(frame, samples)?), vec![length, depth])
+    };
+    Ok(LoadedImage { image, units: units.into_iter().map(String::from).collect(), notes })
+}
+
+/// Reads the samples of all traces to their places.
+fn read_samples<R: Read + Seek>(
+    source: &mut R,
+    header: &Header,
+    survey: &Survey,
+) -> Result<Samples, ReadReason> {
+    source.seek(SeekFrom::Start(header.start)).map_err(ReadReason::Io)?;
+    let layout = TraceLayout {
+        number: header.number,
+        byte_order: header.byte_order,
+        header_bytes: header.trace_header,
+        samples: header.samples,
+        places: &survey.places,
+        plane: survey.trace_places(),
+    };
+    traces::read(source, &layout)
+}
+
+/// Spacing and origin along the last axis.
+fn vertical(
+    header: &Header,
+    traces: &[Trace],
+    options: &SegyOptions,
+    notes: &mut Vec<ReadNote>,
+) -> [f64; 2] {
+    let spacing = header.interval.map(|interval| {
+        let spacing = interval / 1000.0;
+        let is_known = options.vertical.is_some();
+        notes.push(ReadNote::Vertical { interval, spacing, is_known });
+        spacing
+    });
+    if spacing.is_none() {
+        notes.push(ReadNote::NoInterval);
+    }
+    let first = traces.first().map_or(0, |t| t.delay);
+    if let Some(trace) = traces.iter().position(|t| t.delay != first) {
+        let other = traces[trace].delay;
+        notes.push(ReadNote::Delays { first, trace: trace + 1, other });
+    }
+    [spacing.unwrap_or(1.0), first.into()]
+}
+
+fn line_frame(
+    shape: [usize; 2],
+    placement: Option<Placement>,
+    [step, start]: [f64; 2],
+) -> Result<Frame<2>, ReadReason> {
+    let (along, from) = placement.map_or((1.0, 0.0), |p| (p.spacing[0], p.origin[0]));
+    Ok(Frame::new(shape)?.with_spacing([along, step])?.with_origin([from, start])?)
+}
+
+fn cube_frame(
+    shape: [usize; 3],
+    placement: Option<Placement>,
+    [step, start]: [f64; 2],
+) -> Result<Frame<3>, ReadReason> {
+    let frame = Frame::new(shape)?;
+    let Some(Placement { spacing: [sx, sy], axes: [x, y], origin: [ox, oy] }) = placement else {
+        return Ok(frame.with_spacing([1.0, 1.0, step])?.with_origin([0.0, 0.0, start])?);
+    };
+    let direction = [[x[0], y[0], 0.0], [x[1], y[1], 0.0], [0.0, 0.0, 1.0]];
+    let frame = frame.with_spacing([sx, sy, step])?.with_origin([ox, oy, start])?;
+    Ok(frame.with_direction(direction)?)
+}

@@ -1,0 +1,148 @@
+//! Which trace belongs where: numbers in trace headers to places on a grid.
+
+use super::super::{ReadNote, ReadReason};
+use super::SegyOptions;
+use super::trace::Trace;
+
+/// The most places for each trace that is there. A survey of irregular outline fills a third of its
+/// grid or more; fewer traces than this say that the numbers are not what they are taken for.
+const MOST_PLACES: usize = 16;
+
+/// The places of the traces.
+#[derive(Clone, Debug, PartialEq)]
+pub(super) struct Survey {
+    /// Places along x (the crosslines, or the line) and along y (the inlines; 1 for a line).
+    pub shape: [usize; 2],
+    /// Whether inlines and crosslines both vary.
+    pub is_cube: bool,
+    /// The place of each trace, x + nx · y.
+    pub places: Vec<usize>,
+}
+
+/// Numbers that a survey counts by: from `least` on in equal steps.
+#[derive(Clone, Copy, Debug, PartialEq)]
+struct Numbers {
+    least: i64,
+    step: i64,
+    count: usize,
+}
+
+impl Numbers {
+    /// The sparsest numbers that hold all these, of which there is one at least.
+    fn of(numbers: impl Iterator<Item = i32> + Clone) -> Self {
+        let numbers = numbers.map(i64::from);
+        let (least, greatest) =
+            numbers.clone().fold((i64::MAX, i64::MIN), |(a, b), n| (a.min(n), b.max(n)));
+        let step = numbers.fold(0, |step, n| common_divisor(step, n - least)).max(1);
+        Self { least, step, count: ((greatest - least) / step + 1) as usize }
+    }
+
+    fn index(&self, number: i32) -> usize {
+        ((i64::from(number) - self.least) / self.step) as usize
+    }
+
+    fn number(&self, index: usize) -> i64 {
+        self.least + self.step * index as i64
+    }
+
+    fn text(&self) -> String {
+        let by = if self.step == 1 { String::new() } else { format!(" by {}", self.step) };
+        format!("{} to {}{by}", self.least, self.number(self.count - 1))
+    }
+}
+
+fn common_divisor(a: i64, b: i64) -> i64 {
+    if b == 0 { a } else { common_divisor(b, a % b) }
+}
+
+/// What a line's traces are numbered by.
+type Numbering = (&'static str, fn(&Trace) -> i32);
+
+/// In the order in which they are tried.
+const NUMBERINGS: [Numbering; 3] =
+    [("crosslines", |t| t.crossline), ("inlines", |t| t.inline), ("ensembles", |t| t.ensemble)];
+
+impl Survey {
+    /// The number of places.
+    pub fn trace_places(&self) -> usize {
+        self.shape[0] * self.shape[1]
+    }
+
+    /// Arranges traces: by inline and crossline where both vary, else as a line.
+    pub fn arrange(
+        traces: &[Trace],
+        options: &SegyOptions,
+        notes: &mut Vec<ReadNote>,
+    ) -> Result<Self, ReadReason> {
+        let numbers = |of: fn(&Trace) -> i32| Numbers::of(traces.iter().map(of));
+        let (x, y) = (numbers(|t| t.crossline), numbers(|t| t.inline));
+        let [inline, crossline] = options.trace_bytes();
+        if x.count > 1 && y.count > 1 && inline != crossline {
+            let text = format!("inlines {}, crosslines {}", y.text(), x.text());
+            notes.push(ReadNote::Traces { count: traces.len(), numbers: text.clone() });
+            let name = |place: usize| {
+                let (i, j) = (y.number(place / x.count), x.number(place % x.count));
+                format!("inline {i}, crossline {j}")
+            };
+            let place = |t: &Trace| y.index(t.inline) * x.count + x.index(t.crossline);
+            check_filled([x.count, y.count], traces.len(), text)?;
+            let survey = Self {
+                shape: [x.count, y.count],
+                is_cube: true,
+                places: traces.iter().map(place).collect(),
+            };
+            return survey.checked(name, notes);
+        }
+        let numbering = NUMBERINGS.iter().map(|&(name, of)| (name, of, numbers(of)));
+        let Some((name, of, numbers)) = numbering.into_iter().find(|(.., n)| n.count > 1) else {
+            let numbers = "not numbered, a line in the order of the file".into();
+            notes.push(ReadNote::Traces { count: traces.len(), numbers });
+            let places = (0..traces.len()).collect();
+            return Ok(Self { shape: [traces.len(), 1], is_cube: false, places });
+        };
+        let text = format!("{name} {}", numbers.text());
+        notes.push(ReadNote::Traces { count: traces.len(), numbers: text.clone() });
+        check_filled([numbers.count, 1], traces.len(), text)?;
+        let survey = Self {
+            shape: [numbers.count, 1],
+            is_cube: false,
+            places: traces.iter().map(|t| numbers.index(of(t))).collect(),
+        };
+        survey.checked(
+            |place| format!("{} {}", &name[..name.len() - 1], numbers.number(place)),
+            notes,
+        )
+    }
+
+    /// The same if no two traces have one place; says which places have none.
+    fn checked(
+        self,
+        name: impl Fn(usize) -> String,
+        notes: &mut Vec<ReadNote>,
+    ) -> Result<Self, ReadReason> {
+        const FREE: usize = usize::MAX;
+        let mut traces = vec![FREE; self.trace_places()];
+        for (trace, &place) in self.places.iter().enumerate() {
+            if traces[place] != FREE {
+                let (first, second) = (traces[place] + 1, trace + 1);
+                return Err(ReadReason::DuplicateTraces { first, second, number: name(place) });
+            }
+            traces[place] = trace;
+        }
+        let missing = traces.len() - self.places.len();
+        if let Some(first) = traces.iter().position(|&t| t == FREE) {
+            let expected = traces.len();
+            notes.push(ReadNote::MissingTraces { missing, expected, first: name(first) });
+        }
+        Ok(self)
+    }
+}
+
+/// Whether enough places have a trace for the numbers to be what they are taken for.
+fn check_filled(shape: [usize; 2], traces: usize, numbers: String) -> Result<(), ReadReason> {
+    let [nx, ny] = shape.map(|n| n as u128);
+    match nx * ny <= (traces * MOST_PLACES) as u128 {
+        true => Ok(()),
+        false => Err(ReadReason::SparseTraces { traces, places: nx * ny, numbers }),
+    }
+}

@@ -1,0 +1,90 @@
+//! Samples that come trace by trace, as columns of an image, and leave x fastest.
+//!
+//! Traces are read in blocks, and each sample written where it belongs: for every depth the block's
+//! traces beside each other, so that lines of cache are used whole on both sides.
+
+use std::io::Read;
+
+use atomesh::image::Samples;
+
+use super::{ByteOrder, ReadReason, stream};
+
+mod number;
+
+use number::Ibm;
+pub(super) use number::Number;
+
+/// Bytes of traces that are held at a time.
+const BLOCK: usize = 1 << 21;
+
+/// How traces lie in a stream of bytes, one after another.
+pub(super) struct TraceLayout<'a> {
+    pub number: Number,
+    pub byte_order: ByteOrder,
+    /// Bytes before the samples of each.
+    pub header_bytes: usize,
+    /// Samples of each.
+    pub samples: usize,
+    /// Where each belongs in a plane of equal depth.
+    pub places: &'a [usize],
+    /// The places of a plane.
+    pub plane: usize,
+}
+
+/// Reads the samples of all traces to their places; places without a trace stay 0.
+pub(super) fn read(source: &mut dyn Read, layout: &TraceLayout<'_>) -> Result<Samples, ReadReason> {
+    /// Reads numbers with one function for each type.
+    macro_rules! read_as {
+        ($kind:ident, $number:ident) => {
+            Samples::$kind(spread(source, layout, $number::from_be_bytes)?)
+        };
+    }
+    Ok(match layout.number {
+        Number::Ibm => {
+            let ibm = Ibm::new();
+            Samples::F32(spread(source, layout, |b| ibm.decode(u32::from_be_bytes(b)))?)
+        }
+        Number::F32 => read_as!(F32, f32),
+        Number::F64 => read_as!(F64, f64),
+        Number::I8 => read_as!(I8, i8),
+        Number::I16 => read_as!(I16, i16),
+        Number::I32 => read_as!(I32, i32),
+        Number::U8 => read_as!(U8, u8),
+        Number::U16 => read_as!(U16, u16),
+        Number::U32 => read_as!(U32, u32),
+    })
+}
+
+/// The traces as numbers of `N` bytes.
+fn spread<const N: usize, T: Copy + Default>(
+    source: &mut dyn Read,
+    layout: &TraceLayout<'_>,
+    decode: impl Fn([u8; N]) -> T,
+) -> Result<Vec<T>, ReadReason> {
+    let TraceLayout { byte_order, header_bytes, samples: depth, places, plane, .. } = *layout;
+    let mut samples = stream::zeros(plane.saturating_mul(depth))?;
+    let each = header_bytes + depth * N;
+    let mut buffer = vec![0; each * (BLOCK / each).clamp(1, places.len().max(1))];
+    for (block, places) in places.chunks(buffer.len() / each).enumerate() {
+        let bytes = &mut buffer[..places.len() * each];
+        let filled = stream::fill(source, bytes)?;
+        if filled < bytes.len() {
+            let whole = block * (buffer.len() / each) + filled / each;
+            let count = |traces: usize| (traces * depth) as u64;
+            let (expected, found) = (count(layout.places.len()), count(whole));
+            return Err(ReadReason::Truncated { expected, found });
+        }
+        for z in 0..depth {
+            let row = &mut samples[z * plane..][..plane];
+            for (trace, &place) in bytes.chunks_exact(each).zip(places) {
+                let mut number = [0; N];
+                number.copy_from_slice(&trace[header_bytes + z * N..][..N]);
+                if byte_order == ByteOrder::Little {
+                    number.reverse();
+                }
+                row[place] = decode(number);
+            }
+        }
+    }
+    Ok(samples)
+}
