@@ -3,7 +3,8 @@
 
 Needs Python 3.11, a Rust toolchain and, for the C++ peers, a Debian (or their packages). All else is put under
 target/peers: virtual environments, compiled drivers, inputs, results. With ATOMESH_DATA the image is a brain
-(mni152-t1.nii.gz in that folder); without, synthetic grains.
+(mni152-t1.nii.gz in that folder); without, synthetic grains. With ATOMESH_BP2004, the SEG-Y file of the BP 2004
+velocity model, that is meshed too.
 """
 
 import argparse
@@ -17,7 +18,7 @@ sys.dont_write_bytecode = True  # leave the sources' folders as they are
 
 from harness import child, table
 from harness.install import BENCH, PEERS, ROOT, Installer
-from harness.sections import ATOMESH, INPUTS, LIMIT, MESHES, SECTIONS, Maker, scanned_image
+from harness.sections import ATOMESH, BP2004, INPUTS, LIMIT, MESHES, SECTIONS, Maker, scanned_image
 
 RESULTS = PEERS / "results.json"
 SLOW = 20  # seconds from which on one run of a program has to do
@@ -75,10 +76,11 @@ def make_inputs(installer):
     if not image.exists():
         synth = [ATOMESH, "synth", "grains3", "-o", image, "--shape", "197,233,189", "--bytes", "--blur", "1"]
         subprocess.run([str(part) for part in synth], check=True)
-    recipe = f"{image}\n" + (BENCH / "harness" / "inputs.py").read_text()
+    model = [BP2004] if BP2004 else []
+    recipe = f"{image} {model}\n" + (BENCH / "harness" / "inputs.py").read_text()
     mark = INPUTS / "recipe"
     if not (mark.exists() and mark.read_text() == recipe):
-        command = [*installer.command("judge"), BENCH / "harness" / "inputs.py", INPUTS, image]
+        command = [*installer.command("judge"), BENCH / "harness" / "inputs.py", INPUTS, image, *model]
         subprocess.run([str(part) for part in command], check=True)
         mark.write_text(recipe)
 

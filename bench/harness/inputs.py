@@ -1,6 +1,6 @@
 """Makes the inputs once, so that every program gets the same: points, a velocity model, an image's labels.
 
-usage: inputs.py FOLDER IMAGE
+usage: inputs.py FOLDER IMAGE [BP2004]
 
 Raw little-endian files, x fastest: points as f64, velocities as f32, labels as u8. Runs where NumPy is.
 """
@@ -15,6 +15,8 @@ import numpy as np
 COUNT = 1_000_000
 # BP2004's sampling: samples and metres along x and z.
 VELOCITY_SHAPE, VELOCITY_SPACING = (5395, 1911), (12.5, 6.25)
+# 2 Hz at 5 points a wavelength, 1/s, and the greatest slope of sizes: atomesh's own limit.
+BP_RATE, SLOPE = 10, 0.25
 
 
 def jittered(points, share, seed=1):
@@ -78,6 +80,42 @@ def velocity():
     return np.clip(v, 1500, 4500)
 
 
+def bp2004(path):
+    """The BP 2004 velocity benchmark from its SEG-Y file (IBM floats), its slope limited as sizes must be.
+
+    Read apart from atomesh, so that its reader is checked by the way. Water and salt end in jumps, which no mesh of
+    good shape follows: velocities are lowered until v / RATE changes by SLOPE at most from sample to sample, also
+    across corners, so that all programs get the same sizes and none has to limit them.
+    """
+    nx, nz = VELOCITY_SHAPE
+    traces = np.fromfile(path, [("header", "V240"), ("samples", ">u4", nz)], offset=3600)
+    bits = traces["samples"].T  # z, x
+    fraction, exponent = bits & 0xFFFFFF, (bits >> 24 & 0x7F).astype(int)
+    v = np.ldexp(fraction.astype(float), 4 * (exponent - 64) - 24)
+    dx, dz = VELOCITY_SPACING
+    slope = SLOPE * BP_RATE
+    ramp = slope * dx * np.arange(nx)
+    across = slope * np.hypot(dx, dz)
+
+    def along(row):
+        row = np.minimum.accumulate(row - ramp) + ramp
+        return (np.minimum.accumulate((row + ramp)[::-1])[::-1]) - ramp
+
+    def down(v):
+        v[0] = along(v[0])
+        for z in range(1, nz):
+            above = v[z - 1]
+            row = np.minimum(v[z], above + slope * dz)
+            row[1:] = np.minimum(row[1:], above[:-1] + across)
+            row[:-1] = np.minimum(row[:-1], above[1:] + across)
+            v[z] = along(row)
+
+    for _ in range(2):
+        down(v)
+        down(v[::-1])
+    return v
+
+
 def read_nifti(path):
     """The samples of a NIfTI-1 image, axes z, y, x, and its spacing; little-endian, no scaling."""
     data = gzip.open(path).read()
@@ -103,6 +141,8 @@ def main():
     folder, image = Path(sys.argv[1]), sys.argv[2]
     write_points(folder)
     velocity().astype("<f4").tofile(folder / "velocity.f32")
+    if len(sys.argv) > 3:
+        bp2004(sys.argv[3]).astype("<f4").tofile(folder / "bp2004.f32")
     samples, spacing = read_nifti(image)
     labels = (samples > otsu(samples)).astype("u1")
     labels.tofile(folder / "labels.u8")

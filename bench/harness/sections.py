@@ -19,6 +19,8 @@ LIMIT = 300  # seconds that a program may take
 
 # Frequency times points per wavelength, 1/s: edges of 75 to 225 m for 1500 to 4500 m/s.
 RATE = 20
+BP_RATE = 10  # edges of 143 to 479 m for 1429 to 4790 m/s
+BP2004 = os.environ.get("ATOMESH_BP2004")  # the model's SEG-Y file
 EDGE = 6
 
 
@@ -108,16 +110,18 @@ def delaunay(make, dimension):
 
 def graded(make):
     shape, spacing = (5395, 1911), (12.5, 6.25)
-    work = f"graded triangles, velocities of {shape[1]} × {shape[0]} samples"
-    path = INPUTS / "velocity.f32"
-    for threads in (1, 2):
-        make.driver(work, "atomesh", threads, "graded", path, "--shape", *shape, "--spacing", *spacing, "--rate", RATE,
-                    dimension=2)
-    for algorithm, name in ((6, "frontal Delaunay"), (5, "Delaunay")):
-        make.peer(work, f"Gmsh, {name}", 1, "gmsh", path, *shape, *spacing, RATE, algorithm, "MESH",
-                  script="gmsh_graded", dimension=2)
-    make.peer(work, "SeismicMesh", 1, "seismicmesh", path, *shape, *spacing, RATE, "MESH",
-              script="seismicmesh_graded", dimension=2)
+    models = [(f"graded triangles, velocities of {shape[1]} × {shape[0]} samples", INPUTS / "velocity.f32", RATE)]
+    if BP2004:
+        models.append(("BP 2004 at 5 points a wavelength of 2 Hz", INPUTS / "bp2004.f32", BP_RATE))
+    for work, path, rate in models:
+        for threads in (1, 2):
+            make.driver(work, "atomesh", threads, "graded", path, "--shape", *shape, "--spacing", *spacing, "--rate",
+                        rate, dimension=2)
+        for algorithm, name in ((6, "frontal Delaunay"), (5, "Delaunay")):
+            make.peer(work, f"Gmsh, {name}", 1, "gmsh", path, *shape, *spacing, rate, algorithm, "MESH",
+                      script="gmsh_graded", dimension=2)
+        make.peer(work, "SeismicMesh", 1, "seismicmesh", path, *shape, *spacing, rate, "MESH",
+                  script="seismicmesh_graded", dimension=2)
     return make.jobs
 
 

@@ -5,12 +5,14 @@ use std::path::Path;
 use atomesh::image::{Frame, FrameError, Image};
 use atomesh::watch::Watch;
 use atomesh_io::image::{
-    AnyImage, ByteOrder, RawLayout, ReadError, ReadOptions, ReadReason, SampleType, read_image,
+    AnyImage, ByteOrder, LoadedImage, RawLayout, ReadError, ReadOptions, ReadReason, SampleType,
+    SegyOptions, Vertical, load_image,
 };
 use serde::{Deserialize, Serialize};
 
 use crate::failure::Failure;
 use crate::memory;
+use crate::progress::Progress;
 use crate::section::section;
 use crate::values::{Counts, Numbers, Text, WorldBox, named, number_in};
 
@@ -60,6 +62,18 @@ section! {
         /// Raw samples: bytes before the first. Default: 0
         #[arg(long, value_name = "BYTES")]
         pub offset: u64,
+        /// SEG-Y: first bytes of the inline and the crossline number in a trace header; one byte
+        /// twice makes a line. Default: 189,193
+        #[arg(long, value_name = "INLINE,CROSSLINE")]
+        pub trace_bytes: Counts,
+        /// SEG-Y: first bytes of X and Y in a trace header. Default: 181,185, or else 73,77 or 81,85,
+        /// whichever vary first
+        #[arg(long, value_name = "X,Y")]
+        pub coordinate_bytes: Counts,
+        /// SEG-Y: what samples of a trace are along, time (milliseconds) or depth (metres or feet).
+        /// RSF: the first axis is vertical, whatever its label says
+        #[arg(long, value_name = "AXIS", value_parser = named::<Vertical>(&["time", "depth"]))]
+        pub vertical: Vertical,
     }
 }
 
@@ -83,6 +97,23 @@ impl FrameOptions {
             Some(RawOrder::Little) | None => ByteOrder::Little,
         };
         Ok(Some(RawLayout { shape, sample_type, byte_order, offset: self.offset.unwrap_or(0) }))
+    }
+
+    /// How images are read.
+    pub fn read_options(&self) -> Result<ReadOptions, Failure> {
+        let pair = |option: &str, counts: &Option<Counts>| match counts.as_ref().map(|c| &c.0[..]) {
+            None => Ok(None),
+            Some(&[a, b]) if [a, b].iter().all(|byte| (1..=237).contains(byte)) => Ok(Some([a, b])),
+            Some(found) => Err(Failure::misuse(format!(
+                "{option} is {found:?}; expected two bytes from 1 to 237"
+            ))),
+        };
+        let segy = SegyOptions {
+            trace_bytes: pair("--trace-bytes", &self.trace_bytes)?,
+            coordinate_bytes: pair("--coordinate-bytes", &self.coordinate_bytes)?,
+            vertical: self.vertical,
+        };
+        Ok(ReadOptions { raw: self.raw_layout()?, segy })
     }
 
     /// The frame with what the options override.
@@ -141,12 +172,22 @@ fn wrong_count(option: &str, found: usize, expected: usize, dimension: usize) ->
     ))
 }
 
+/// Reads an image and says what its reader took for granted.
+pub fn read(path: &Path, options: &ReadOptions, watch: &mut Progress) -> Result<AnyImage, Failure> {
+    let loaded = load(path, options, watch)?;
+    for note in &loaded.notes {
+        let kind = if note.is_warning() { "warning" } else { "note" };
+        watch.say(&format!("{kind}: {}: {note}", path.display()));
+    }
+    Ok(loaded.image)
+}
+
 /// Reads an image, unless its file alone is larger than the memory there is.
-pub fn read(
+pub fn load(
     path: &Path,
-    raw: Option<RawLayout>,
+    options: &ReadOptions,
     watch: &mut dyn Watch,
-) -> Result<AnyImage, Failure> {
+) -> Result<LoadedImage, Failure> {
     let bytes = path.metadata().map_or(0, |m| m.len());
     if let Some(available) = memory::available()
         && bytes > available
@@ -156,19 +197,22 @@ pub fn read(
         let failure = Failure::content(message).about(path);
         return Err(failure.advise("crop or resample the image first"));
     }
-    read_image(path, &ReadOptions { raw, ..ReadOptions::default() }, watch).map_err(
-        |ReadError { path, reason, .. }| match reason {
-            ReadReason::Cancelled(_) => Failure::cancelled(),
-            ReadReason::UnknownExtension { .. } => Failure::misuse(&reason)
+    load_image(path, options, watch).map_err(|ReadError { path, reason, .. }| match reason {
+        ReadReason::Cancelled(_) => Failure::cancelled(),
+        ReadReason::UnknownExtension { .. } => Failure::misuse(&reason)
+            .about(&path)
+            .advise("rename the file, or describe raw samples by --shape and --dtype"),
+        ReadReason::NoRawLayout => Failure::misuse("raw samples say neither shape nor type")
+            .about(&path)
+            .advise("give --shape NX,NY[,NZ] and --dtype TYPE"),
+        ReadReason::DuplicateTraces { .. } | ReadReason::SparseTraces { .. } => {
+            Failure::content(&reason)
                 .about(&path)
-                .advise("rename the file, or describe raw samples by --shape and --dtype"),
-            ReadReason::NoRawLayout => Failure::misuse("raw samples say neither shape nor type")
-                .about(&path)
-                .advise("give --shape NX,NY[,NZ] and --dtype TYPE"),
-            ReadReason::RawSize { .. } | ReadReason::RawShape { .. } => {
-                Failure::misuse(&reason).about(&path)
-            }
-            _ => Failure::content(&reason).about(&path),
-        },
-    )
+                .advise("--trace-bytes INLINE,CROSSLINE says where; one byte twice makes a line")
+        }
+        ReadReason::RawSize { .. } | ReadReason::RawShape { .. } => {
+            Failure::misuse(&reason).about(&path)
+        }
+        _ => Failure::content(&reason).about(&path),
+    })
 }

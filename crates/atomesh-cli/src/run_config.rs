@@ -10,7 +10,7 @@ use atomesh::enhance::{
 use atomesh::image::Units;
 use atomesh::improve::{Align, ImproveOptions};
 use atomesh::optimize::{EngineKind, OptimizeOptions};
-use atomesh::pipeline::{LatticeKind, MeshKind, MeshOptions, Size};
+use atomesh::pipeline::{LatticeKind, MeshKind, MeshOptions, POINTS_PER_WAVELENGTH, Size};
 use atomesh::potential::Interpolation;
 use serde::{Deserialize, Serialize};
 
@@ -25,7 +25,7 @@ const MOST_STEPS: u64 = 10;
 section! {
     /// The files that a mesh is made from.
     pub struct InputOptions {
-        /// Image to mesh: .png .jpg .pgm .tif .npy .nii .nii.gz, or raw samples with --shape and
+        /// Image to mesh: .png .jpg .pgm .tif .npy .nii .nii.gz .segy .rsf, or raw samples with --shape and
         /// --dtype. Two axes make triangles, three make tetrahedra
         #[arg(value_name = "IMAGE", help_heading = "Arguments")]
         pub image: PathBuf,
@@ -195,6 +195,15 @@ section! {
         #[arg(long, value_name = "WHAT",
             value_parser = named::<GradeBy>(&["density", "curvature", "distance"]))]
         pub grade_by: GradeBy,
+        /// Greatest frequency of waves in 1/s, if IMAGE holds their velocities: edges as long as a
+        /// wavelength, v / f, over --points-per-wavelength, instead of --size
+        #[arg(long, value_name = "HZ", conflicts_with_all = ["size", "size_field"],
+            value_parser = number_in(f64::MIN_POSITIVE, f64::MAX, "a frequency above 0"))]
+        pub frequency: f64,
+        /// Edges in a wavelength, with --frequency. Default: 5
+        #[arg(long, value_name = "COUNT",
+            value_parser = number_in(f64::MIN_POSITIVE, f64::MAX, "a number above 0"))]
+        pub points_per_wavelength: f64,
         /// Weight β of the image against regularity, 0 to 1. Default: 0.45
         #[arg(long, value_name = "BETA", allow_hyphen_values = true,
             value_parser = number_in(0.0, 1.0, "a number from 0 to 1"))]
@@ -343,6 +352,25 @@ section! {
     }
 }
 
+impl LatticeOptions {
+    /// What --size or --frequency ask for.
+    fn wanted_size(&self) -> Result<Size, Failure> {
+        let points = self.points_per_wavelength;
+        match (self.frequency, points, self.size) {
+            (None, None, size) => Ok(size.map_or(Size::Default, |s| s.0)),
+            (None, Some(_), _) => {
+                Err(Failure::misuse("--points-per-wavelength without --frequency; expected both"))
+            }
+            (Some(_), ..) if self.units == Some(Units::Samples) => {
+                Err(Failure::misuse("--frequency with --units samples; expected physical units"))
+            }
+            (Some(frequency), points, _) => {
+                Ok(Size::Wavelength { frequency, points: points.unwrap_or(POINTS_PER_WAVELENGTH) })
+            }
+        }
+    }
+}
+
 /// Everything that decides a run: tables of options with the command line's names.
 #[derive(Clone, Debug, Default, PartialEq, clap::Args, Serialize, Deserialize)]
 #[serde(default, deny_unknown_fields, rename_all = "kebab-case")]
@@ -408,10 +436,13 @@ impl RunConfig {
         // a size given as one thing replaces the other
         let mut below = other;
         if self.lattice.size.is_some() {
-            below.input.size_field = None;
+            (below.input.size_field, below.lattice.frequency) = (None, None);
         }
         if self.input.size_field.is_some() {
-            below.lattice.size = None;
+            (below.lattice.size, below.lattice.frequency) = (None, None);
+        }
+        if self.lattice.frequency.is_some() {
+            (below.lattice.size, below.input.size_field) = (None, None);
         }
         if self.lattice.beta.is_some() {
             below.input.beta_field = None;
@@ -444,6 +475,7 @@ impl RunConfig {
                 beta: Some(mesh.image_weight),
                 units: Some(mesh.units),
                 spacing_factor: Some(mesh.spacing_factor),
+                points_per_wavelength: self.lattice.frequency.map(|_| POINTS_PER_WAVELENGTH),
                 ..Default::default()
             },
             features: PotentialOptions {
@@ -514,7 +546,7 @@ impl RunConfig {
             interpolation: moves.interpolation.unwrap_or(default.interpolation),
             kind: default.kind,
             units: lattice.units.unwrap_or(default.units),
-            size: lattice.size.map_or(Size::Default, |s| s.0),
+            size: lattice.wanted_size()?,
             grade_by: lattice.grade_by.unwrap_or(default.grade_by),
             image_weight: lattice.beta.unwrap_or(default.image_weight),
             lattice: lattice.lattice.unwrap_or(default.lattice),
@@ -598,5 +630,22 @@ mod tests {
         assert_eq!((both.lattice.beta, both.lattice.size), (Some(0.75), None));
         assert_eq!(both.input.beta_field, None);
         assert_eq!(both.input.size_field, Some("d.npy".into()));
+    }
+
+    #[test]
+    fn a_frequency_takes_the_place_of_a_size() {
+        let file = RunConfig::parse("[lattice]\nsize = 8.0\n").unwrap();
+        let mut line = RunConfig::default();
+        line.lattice.frequency = Some(2.0);
+        let both = line.clone().or(file);
+        let size = both.mesh_options::<2>().unwrap().size;
+        let points = POINTS_PER_WAVELENGTH;
+        assert_eq!(size, Size::Wavelength { frequency: 2.0, points });
+        assert_eq!(both.with_defaults::<2>().lattice.points_per_wavelength, Some(points));
+
+        line.lattice.units = Some(Units::Samples);
+        assert!(line.check().is_err());
+        let points = RunConfig::parse("[lattice]\npoints-per-wavelength = 4.0\n").unwrap();
+        assert!(points.check().is_err());
     }
 }

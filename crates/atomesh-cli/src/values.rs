@@ -203,7 +203,8 @@ impl FromStr for SizeValue {
 impl Serialize for SizeValue {
     fn serialize<S: Serializer>(&self, serializer: S) -> Result<S::Ok, S::Error> {
         match self.0 {
-            Size::Default => serializer.serialize_none(),
+            // a wavelength has options of its own
+            Size::Default | Size::Wavelength { .. } => serializer.serialize_none(),
             Size::Constant(d) => serializer.serialize_f64(d),
             Size::Range { min, max } => serializer.collect_str(&format_args!("{min}..{max}")),
         }

@@ -97,10 +97,10 @@ pub struct FeaturesArgs {
 /// [`Failure`] if a file cannot be used or options make no sense.
 pub fn run(args: &FeaturesArgs, watch: &mut Progress) -> Result<String, Failure> {
     let formats = check_outputs(args)?;
-    let raw = args.frame.raw_layout()?;
+    let options = args.frame.read_options()?;
     let mesh = mesh_file::read(&args.mesh)?;
     let path = args.image.as_ref().or(args.potential.as_ref());
-    let image = path.map(|path| frame_options::read(path, raw, watch)).transpose()?;
+    let image = path.map(|path| frame_options::read(path, &options, watch)).transpose()?;
     match (mesh, image) {
         (AnyMesh::Flat(mesh), None) => find(args, formats, &mesh, None, watch),
         (AnyMesh::Volume(mesh), None) => find(args, formats, &mesh, None, watch),

@@ -7,7 +7,7 @@ use atomesh::geometry::Bounds;
 use atomesh::image::Frame;
 use atomesh::measure::shape;
 use atomesh::watch::Watch;
-use atomesh_io::image::AnyImage;
+use atomesh_io::image::{AnyImage, LoadedImage};
 use atomesh_io::mesh::{AnyMesh, LoadedMesh, MeshFormat};
 
 use crate::failure::Failure;
@@ -16,12 +16,14 @@ use crate::mesh_file;
 
 /// Show what an image or mesh file holds
 ///
-/// Images: shape, sample type, frame, range, NaN count. Meshes: counts, box, quality, fields at the
+/// Images: shape, sample type, frame, range, NaN count; of seismic data also units, and what was taken
+/// for granted about traces. Meshes: counts, box, quality, fields at the
 /// points, and the options that made them.
 #[derive(Debug, clap::Args)]
 #[command(after_help = "\
 Examples:
   atomesh info brain.nii.gz
+  atomesh info line.segy --vertical depth
   atomesh info mesh.vtu
   atomesh info cube.raw --shape 300,200,100 --dtype float32")]
 pub struct InfoArgs {
@@ -37,15 +39,15 @@ pub struct InfoArgs {
 /// # Errors
 /// [`Failure`] if the file cannot be read.
 pub fn run(args: &InfoArgs, watch: &mut dyn Watch) -> Result<String, Failure> {
-    let raw = args.frame.raw_layout()?;
-    if raw.is_none() && MeshFormat::of(&args.file).is_ok() {
+    let options = args.frame.read_options()?;
+    if options.raw.is_none() && MeshFormat::of(&args.file).is_ok() {
         return match &mesh_file::read(&args.file)? {
             AnyMesh::Flat(loaded) => mesh_text(loaded, "triangles", watch),
             AnyMesh::Volume(loaded) => mesh_text(loaded, "tetrahedra", watch),
         }
         .map_err(|f| f.about(&args.file));
     }
-    let image = frame_options::read(&args.file, raw, watch)?;
+    let LoadedImage { image, units, notes } = frame_options::load(&args.file, &options, watch)?;
     let mut text = String::new();
     let range = image.range();
     line(&mut text, "type", image.type_name());
@@ -58,6 +60,13 @@ pub fn run(args: &InfoArgs, watch: &mut dyn Watch) -> Result<String, Failure> {
         AnyImage::Flat(image) => frame_text(&args.frame.apply(*image.frame())?),
         AnyImage::Volume(image) => frame_text(&args.frame.apply(*image.frame())?),
     };
+    let named = units.iter().map(|unit| if unit.is_empty() { "unknown" } else { unit });
+    if !units.is_empty() {
+        line(&mut text, "units", named.collect::<Vec<_>>().join(","));
+    }
+    for note in &notes {
+        line(&mut text, if note.is_warning() { "warning" } else { "note" }, note);
+    }
     Ok(frame + &text)
 }
 

@@ -15,8 +15,7 @@ use atomesh::pipeline::{
 use atomesh::potential::PotentialError;
 use atomesh::region::RegionError;
 use atomesh::voronoi::PolyReport;
-use atomesh::watch::Watch;
-use atomesh_io::image::AnyImage;
+use atomesh_io::image::{AnyImage, ReadOptions};
 use serde_json::json;
 
 use crate::dimension::Dimension;
@@ -73,6 +72,8 @@ Examples:
   Only the brain, up to its smooth outline, cells labelled by tissue, of second order:
     atomesh mesh t1.nii.gz -o brain.msh --features edges --size 6 --mask brain.nii.gz \
       --labels tissue.nii.gz --order 2
+  Five edges in a wavelength of 2 Hz, from the velocities of a SEG-Y line:
+    atomesh mesh velocity.segy -o velocity.vtu --vertical depth --frequency 2 --features none
   Raw samples with wells as fixed atoms:
     atomesh mesh cube.raw -o cube.vtu --shape 300,200,100 --dtype float32 \\
       --spacing 25,25,4 --seed-point 2500,1000,200 --seed-point 5000,4000,200";
@@ -100,7 +101,7 @@ pub fn run(args: MeshArgs, watch: &mut Progress) -> Result<String, Failure> {
         let _guard = writing();
         outputs.check(&run.input, args.write_config.as_deref())?;
     }
-    let image = frame_options::read(&shown, run.frame.raw_layout()?, watch)?;
+    let image = frame_options::read(&shown, &run.frame.read_options()?, watch)?;
     let job = Job { run: &run, path: &shown, outputs, write_config: args.write_config.as_deref() };
     match image {
         AnyImage::Flat(image) => job.run(image, &Dimension::flat(), watch),
@@ -228,9 +229,10 @@ impl Job<'_> {
         &self,
         path: &Path,
         dimension: &Dimension<D>,
-        watch: &mut dyn Watch,
+        watch: &mut Progress,
     ) -> Result<Image<D>, Failure> {
-        let any = frame_options::read(path, None, watch)?;
+        let options = ReadOptions { raw: None, ..self.run.frame.read_options()? };
+        let any = frame_options::read(path, &options, watch)?;
         let found = any.dimension();
         let Some(field) = (dimension.image)(any) else {
             let message = format!("has {found} axes; expected {D}, as {}", self.path.display());
@@ -386,6 +388,16 @@ impl Job<'_> {
             PipelineError::Region(_) => field_failure(&error, self.run.input.mask.as_deref()),
             PipelineError::Distance(_) if self.run.input.size_field.is_some() => {
                 field_failure(&error, self.run.input.size_field.as_deref())
+            }
+            PipelineError::Distance(DistanceError::FieldValue { .. }) => Failure::content(error)
+                .about(self.path)
+                .advise("--frequency needs an image of velocities above 0"),
+            PipelineError::Distance(DistanceError::BelowStep { .. })
+                if lattice.frequency.is_some() =>
+            {
+                Failure::misuse(error)
+                    .about(self.path)
+                    .advise("choose a lower --frequency or fewer --points-per-wavelength")
             }
             PipelineError::Distance(DistanceError::BelowStep { .. }) => Failure::misuse(error)
                 .about(self.path)

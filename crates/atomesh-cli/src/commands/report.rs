@@ -105,7 +105,7 @@ fn read<const D: usize>(
     dimension: &Dimension<D>,
     watch: &mut Progress,
 ) -> Result<Image<D>, Failure> {
-    let any = frame_options::read(path, args.frame.raw_layout()?, watch)?;
+    let any = frame_options::read(path, &args.frame.read_options()?, watch)?;
     let axes = any.dimension();
     let Some(image) = (dimension.image)(any) else {
         let message = format!("has {axes} axes; the mesh is made of {}", dimension.cells);

@@ -197,7 +197,7 @@ fn read<const D: usize>(
     pick: fn(AnyImage) -> Option<Image<D>>,
     watch: &mut Progress,
 ) -> Result<Image<D>, Failure> {
-    let any = frame_options::read(path, args.frame.raw_layout()?, watch)?;
+    let any = frame_options::read(path, &args.frame.read_options()?, watch)?;
     let axes = any.dimension();
     let Some(image) = pick(any) else {
         let cells = if D == 2 { "triangles" } else { "tetrahedra" };

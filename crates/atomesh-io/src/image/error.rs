@@ -156,10 +156,7 @@ pub enum ReadReason {
         shape: Vec<usize>,
     },
     /// Two traces of a seismic file have the same numbers.
-    #[error(
-        "traces {first} and {second} both are {number}; expected one trace for each: stack them, or \
-         say where their numbers stand"
-    )]
+    #[error("traces {first} and {second} both are {number}; expected one trace for each")]
     DuplicateTraces {
         /// The first of the two, from 1.
         first: usize,
@@ -171,7 +168,7 @@ pub enum ReadReason {
     /// The numbers of traces span a grid that is nearly empty.
     #[error(
         "{traces} traces have {numbers}, a grid of {places} places; expected a trace at every 16th \
-         or more: say where their numbers stand"
+         or more"
     )]
     SparseTraces {
         /// The traces in the file.

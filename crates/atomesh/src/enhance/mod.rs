@@ -21,6 +21,7 @@
 mod crest;
 mod crossings;
 mod edge_crests;
+mod denoise;
 mod horizons;
 mod faults;
 mod labels;
@@ -28,6 +29,8 @@ mod mixture;
 mod quantile;
 mod ridges;
 mod scale;
+
+pub use denoise::{DenoiseError, DenoiseOptions, denoise, noise_level};
 
 use crate::image::{Grid, Image, Samples, Stencil, Units, gaussian, gaussian_between, magnitude};
 use crate::watch::{Cancelled, Phase, Watch, check};

@@ -30,7 +30,7 @@ mod tests;
 pub use error::{PipelineError, Warning};
 pub use estimate::Estimate;
 pub use method::Method;
-pub use options::{LatticeKind, MeshKind, MeshOptions, Size};
+pub use options::{LatticeKind, MeshKind, MeshOptions, POINTS_PER_WAVELENGTH, Size};
 pub use outcome::{MeshReport, Outcome, VoronoiReport, sides};
 
 use crate::distance::{GRADIENT_LIMIT, Grading, NominalDistance, default_distance};
@@ -207,6 +207,7 @@ fn width_for_faces<const D: usize>(
         _ if inputs.size_field.is_some() => return None,
         Size::Default => default_distance(&grid),
         Size::Constant(d) | Size::Range { min: d, .. } => d,
+        Size::Wavelength { .. } => return None,
     };
     Some((0.25 * distance).max(grid.least_step()))
 }
@@ -228,6 +229,12 @@ fn nominal_distance<const D: usize>(
         Size::Range { min, max } => {
             let grading = Grading { by: options.grade_by, ..Grading::new(min, max) };
             NominalDistance::from_potential(grid, samples, &grading)?
+        }
+        Size::Wavelength { frequency, points } => {
+            let rate = (frequency * points) as f32;
+            let mut lengths = inputs.image.samples().to_f32();
+            lengths.iter_mut().for_each(|v| *v /= rate);
+            NominalDistance::from_field(grid, &lengths, GRADIENT_LIMIT)?
         }
     })
 }

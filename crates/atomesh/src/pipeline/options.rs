@@ -27,7 +27,20 @@ pub enum Size {
         /// Where there are none.
         max: f64,
     },
+    /// For waves: the image holds velocities v in lattice units a second, and d = v / (frequency · points), so
+    /// that a wavelength has so many edges; its slope limited as [`crate::distance::NominalDistance::from_field`]
+    /// does.
+    Wavelength {
+        /// In 1/s.
+        frequency: f64,
+        /// Edges in a wavelength.
+        points: f64,
+    },
 }
+
+/// Edges in a wavelength if nobody says otherwise: what finite elements of low order need for waves that stay in
+/// shape over tens of wavelengths.
+pub const POINTS_PER_WAVELENGTH: f64 = 5.0;
 
 /// How the box is filled with atoms.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]

@@ -256,6 +256,30 @@ fn a_constant_image_gives_a_warning_and_a_regular_mesh() {
 }
 
 #[test]
+fn edges_are_a_share_of_a_wavelength() {
+    // 1500 to 2100 m/s over 2000 m: a slope of d of 0.03, well below the limit
+    let frame = Frame::new([101, 101]).unwrap().with_spacing([20.0, 20.0]).unwrap();
+    let velocities = image(frame, |i| 1500.0 + 6.0 * i[1] as f32);
+    let features = FeatureOptions { features: Features::None, ..Default::default() };
+    let size = Size::Wavelength { frequency: 2.0, points: 5.0 };
+    let options = MeshOptions { features, size, ..Default::default() };
+    let outcome = run(&Method::flat(), &velocities, options.clone()).unwrap();
+    assert_sound(&outcome, "wavelength");
+    let distance = outcome.distance();
+    for depth in [0.0, 500.0, 1700.0] {
+        let expected = (1500.0 + 0.3 * depth) / 10.0;
+        let found = distance.at(&[900.0, depth]);
+        // nodes hold the least d within half a node, 40 m at most, of theirs
+        assert!((found - expected).abs() < 0.03 * 80.0, "{found} at {depth}; expected {expected}");
+    }
+    let mean = outcome.report(&mut Silent).unwrap().shape.edge_mean;
+    assert!((160.0..205.0).contains(&mean), "{mean}: about 180, the middle of 150 to 210");
+    let still = image(frame, |i| if i == [5, 1] { 0.0 } else { 1500.0 });
+    let error = run(&Method::flat(), &still, options).unwrap_err().to_string();
+    assert!(error.contains("distance 0 at sample 106"), "{error}");
+}
+
+#[test]
 fn a_distance_beyond_the_box_gives_a_warning_and_the_coarsest_mesh() {
     let flat = sheet(Frame::new([30, 20]).unwrap());
     let outcome = run(&Method::flat(), &flat, sized(100.0)).unwrap();
