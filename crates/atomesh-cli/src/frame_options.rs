@@ -64,7 +64,7 @@ section! {
         pub offset: u64,
         /// SEG-Y: first bytes of the inline and the crossline number in a trace header; one byte
         /// twice makes a line. Default: 189,193
-        #[arg(long, value_name = "INLINE,CROSSLINE")]
+        #[arg(long, value_name = "INLINE,XLINE")]
         pub trace_bytes: Counts,
         /// SEG-Y: first bytes of X and Y in a trace header. Default: 181,185, or else 73,77 or 81,85,
         /// whichever vary first
@@ -208,7 +208,7 @@ pub fn load(
         ReadReason::DuplicateTraces { .. } | ReadReason::SparseTraces { .. } => {
             Failure::content(&reason)
                 .about(&path)
-                .advise("--trace-bytes INLINE,CROSSLINE says where; one byte twice makes a line")
+                .advise("--trace-bytes INLINE,XLINE says where; one byte twice makes a line")
         }
         ReadReason::RawSize { .. } | ReadReason::RawShape { .. } => {
             Failure::misuse(&reason).about(&path)
