@@ -1,6 +1,6 @@
 //! Image work, in samples per second: Gaussian, gradients, potentials.
 
-use atomesh::enhance::{FeatureOptions, Features, enhance};
+use atomesh::enhance::{DenoiseOptions, FeatureOptions, Features, denoise, enhance};
 use atomesh::image::{
     Frame, Grid, Image, Samples, StructureTensor, gaussian, gradient_magnitude, prewitt_magnitude,
 };
@@ -25,6 +25,15 @@ fn image_work(criterion: &mut Criterion) {
         group.bench_function(name, |b| b.iter(|| gaussian(&mut values, SHAPE, sigma)));
     }
     group.bench_function("gaussian", |b| b.iter(|| gaussian(&mut values, SHAPE, [2.0; 3])));
+
+    // a slab, since each sample is compared with 342 others
+    let slab = Grid { shape: [SIDE, SIDE, 8], step: [1.0; 3] };
+    let options = DenoiseOptions::for_dimension(3);
+    group.throughput(Throughput::Elements(slab.sample_count() as u64));
+    group.bench_function("denoise", |b| {
+        b.iter(|| denoise(&values[..slab.sample_count()], &slab, &options, &mut Silent));
+    });
+    group.throughput(Throughput::Elements((SIDE * SIDE * SIDE) as u64));
 
     let single = Samples::F32(values);
     group.bench_function("range_f32", |b| b.iter(|| single.range()));

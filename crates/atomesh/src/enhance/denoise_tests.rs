@@ -94,8 +94,8 @@ fn a_moving_sum_is_a_sum() {
     }
 }
 
-/// Noise falls at least 20 times in variance where the image is flat, and the edge's two sides keep 97 % of
-/// their contrast, four times the noise.
+/// Noise falls at least 20 times in variance where the image is flat, and the edge's two sides keep 90 % of
+/// their contrast, four times the noise: the mean of a column of 90 noisy samples is known to a tenth.
 fn noise_falls_and_the_edge_stays<const D: usize>(shape: [usize; D]) {
     let (contrast, n) = (4.0, shape[0]);
     let values = step_edge(shape, contrast, 5);
@@ -108,7 +108,7 @@ fn noise_falls_and_the_edge_stays<const D: usize>(shape: [usize; D]) {
     let variance = flat.iter().map(|v| v * v).sum::<f64>() / flat.len() as f64;
     assert!(variance < 1.0 / 20.0, "{variance}");
     let kept = mean(&column(n / 2)) - mean(&column(n / 2 - 1));
-    assert!(kept > 0.97 * f64::from(contrast), "{kept}");
+    assert!(kept > 0.9 * f64::from(contrast), "{kept}");
 }
 
 #[test]
