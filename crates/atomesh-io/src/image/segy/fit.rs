@@ -52,18 +52,29 @@ pub(super) fn place(
         notes.push(ReadNote::Angles { code: odd.units });
         return None;
     }
-    let varies = |k: &usize| traces.iter().any(|t| t.places[*k] != traces[0].places[*k]);
     let searched = &searched[..searched.len().min(COORDINATE_BYTES.len())];
+    let varies = |k: &usize| traces.iter().any(|t| t.places[*k] != traces[0].places[*k]);
     let fitted = (0..searched.len()).find(varies).and_then(|k| {
         let positions: Vec<Vector> = traces.iter().map(|t| t.position(k)).collect();
-        Some((k, fit(&positions, survey)?, positions))
+        Some((fit(&positions, survey)?, positions))
     });
-    let Some((_, placement, positions)) = fitted else {
+    let Some((placement, positions)) = fitted else {
         let bytes: Vec<_> = searched.iter().map(|[x, y]| format!("{x} and {y}")).collect();
         notes.push(ReadNote::NoCoordinates { bytes: bytes.join(", ") });
         return None;
     };
     let resolution = traces.iter().map(Trace::resolution).fold(0.0, f64::max);
+    notes.extend(misfit(&placement, &positions, survey, resolution));
+    if survey.is_cube { Some(placement) } else { Some(along(placement, survey, notes)) }
+}
+
+/// The trace that is farthest off its place, if it is too far.
+fn misfit(
+    placement: &Placement,
+    positions: &[Vector],
+    survey: &Survey,
+    resolution: f64,
+) -> Option<ReadNote> {
     let spacings = &placement.spacing[..if survey.is_cube { 2 } else { 1 }];
     let least = spacings.iter().copied().fold(f64::INFINITY, f64::min);
     let tolerance = TOLERANCE * least + resolution;
@@ -72,14 +83,8 @@ pub(super) fn place(
         (p[0] - x).hypot(p[1] - y)
     });
     let worst = off.enumerate().fold((0, 0.0), |w, (k, d)| if d > w.1 { (k, d) } else { w });
-    if worst.1 > tolerance {
-        let (trace, distance) = (worst.0 + 1, worst.1);
-        notes.push(ReadNote::Irregular { trace, distance, tolerance });
-    }
-    if !survey.is_cube {
-        return Some(along(placement, survey, notes));
-    }
-    Some(placement)
+    let (trace, distance) = (worst.0 + 1, worst.1);
+    (distance > tolerance).then_some(ReadNote::Irregular { trace, distance, tolerance })
 }
 
 /// The place's numbers along x and y.

@@ -78,40 +78,56 @@ impl Survey {
         let (x, y) = (numbers(|t| t.crossline), numbers(|t| t.inline));
         let [inline, crossline] = options.trace_bytes();
         if x.count > 1 && y.count > 1 && inline != crossline {
-            let text = format!("inlines {}, crosslines {}", y.text(), x.text());
-            notes.push(ReadNote::Traces { count: traces.len(), numbers: text.clone() });
-            let name = |place: usize| {
-                let (i, j) = (y.number(place / x.count), x.number(place % x.count));
-                format!("inline {i}, crossline {j}")
-            };
-            let place = |t: &Trace| y.index(t.inline) * x.count + x.index(t.crossline);
-            check_filled([x.count, y.count], traces.len(), text)?;
-            let survey = Self {
-                shape: [x.count, y.count],
-                is_cube: true,
-                places: traces.iter().map(place).collect(),
-            };
-            return survey.checked(name, notes);
+            return Self::cube(traces, [x, y], notes);
         }
-        let numbering = NUMBERINGS.iter().map(|&(name, of)| (name, of, numbers(of)));
-        let Some((name, of, numbers)) = numbering.into_iter().find(|(.., n)| n.count > 1) else {
-            let numbers = "not numbered, a line in the order of the file".into();
-            notes.push(ReadNote::Traces { count: traces.len(), numbers });
-            let places = (0..traces.len()).collect();
-            return Ok(Self { shape: [traces.len(), 1], is_cube: false, places });
-        };
-        let text = format!("{name} {}", numbers.text());
+        let mut numbering = NUMBERINGS.iter().map(|&(name, of)| (name, of, numbers(of)));
+        match numbering.find(|(.., numbers)| numbers.count > 1) {
+            Some((name, of, numbers)) => Self::line(traces, (name, of), numbers, notes),
+            None => {
+                let numbers = "not numbered, a line in the order of the file".into();
+                notes.push(ReadNote::Traces { count: traces.len(), numbers });
+                let places = (0..traces.len()).collect();
+                Ok(Self { shape: [traces.len(), 1], is_cube: false, places })
+            }
+        }
+    }
+
+    /// Crosslines along x, inlines along y.
+    fn cube(
+        traces: &[Trace],
+        [x, y]: [Numbers; 2],
+        notes: &mut Vec<ReadNote>,
+    ) -> Result<Self, ReadReason> {
+        let shape = [x.count, y.count];
+        let text = format!("inlines {}, crosslines {}", y.text(), x.text());
         notes.push(ReadNote::Traces { count: traces.len(), numbers: text.clone() });
-        check_filled([numbers.count, 1], traces.len(), text)?;
-        let survey = Self {
-            shape: [numbers.count, 1],
-            is_cube: false,
-            places: traces.iter().map(|t| numbers.index(of(t))).collect(),
+        check_filled(shape, traces.len(), text)?;
+        let place = |t: &Trace| y.index(t.inline) * x.count + x.index(t.crossline);
+        let name = |place: usize| {
+            let (inline, crossline) = (y.number(place / x.count), x.number(place % x.count));
+            format!("inline {inline}, crossline {crossline}")
         };
-        survey.checked(
-            |place| format!("{} {}", &name[..name.len() - 1], numbers.number(place)),
-            notes,
-        )
+        let places = traces.iter().map(place).collect();
+        Self { shape, is_cube: true, places }.checked(name, notes)
+    }
+
+    /// Numbered traces along x.
+    fn line(
+        traces: &[Trace],
+        (plural, of): Numbering,
+        numbers: Numbers,
+        notes: &mut Vec<ReadNote>,
+    ) -> Result<Self, ReadReason> {
+        let shape = [numbers.count, 1];
+        let text = format!("{plural} {}", numbers.text());
+        notes.push(ReadNote::Traces { count: traces.len(), numbers: text.clone() });
+        check_filled(shape, traces.len(), text)?;
+        let name = |place: usize| {
+            let singular = plural.trim_end_matches('s');
+            format!("{singular} {}", numbers.number(place))
+        };
+        let places = traces.iter().map(|t| numbers.index(of(t))).collect();
+        Self { shape, is_cube: false, places }.checked(name, notes)
     }
 
     /// The same if no two traces have one place; says which places have none.
