@@ -74,7 +74,7 @@ pub fn run(args: &EnhanceArgs, watch: &mut Progress) -> Result<String, Failure> 
             check_writable(path)?;
         }
     }
-    match frame_options::read(&args.image, args.frame.raw_layout()?, watch)? {
+    match frame_options::read(&args.image, &args.frame.read_options()?, watch)? {
         AnyImage::Flat(image) => enhance(args, image, picture, &Dimension::flat(), watch),
         AnyImage::Volume(image) => enhance(args, image, picture, &Dimension::volume(), watch),
     }
