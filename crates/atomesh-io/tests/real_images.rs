@@ -50,6 +50,6 @@ fn the_bp_2004_velocities_are_12_and_a_half_by_6_and_a_quarter_metres_apart() {
     assert_eq!(loaded.image.origin(), [12.5, 0.0]);
     let range = loaded.image.range();
     // as NumPy finds it in the file, beside its own decoding of IBM's numbers
-    assert!((range.min, range.max) == (1429.000_244_140_625, 4790.0) && range.nan_count == 0);
+    assert!((range.min, range.max) == (1_429.000_244_140_625, 4790.0) && range.nan_count == 0);
     assert!(loaded.notes.contains(&ReadNote::Feet)); // says the header, though the name says metres
 }
