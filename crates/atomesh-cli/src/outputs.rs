@@ -134,10 +134,7 @@ impl Outputs {
         if let Some(path) = &potential {
             check_potential(path)?;
         }
-        let z_is_height = matches!(
-            ImageFormat::from_path(image),
-            Some(ImageFormat::Nifti | ImageFormat::NiftiGz)
-        );
+        let z_is_height = ImageFormat::of(image).is_some_and(ImageFormat::z_is_height);
         let (report, html) = match (options.report.clone(), options.html.clone()) {
             (Some(report), Some(_)) if is_page(&report) => {
                 let message = "--html names another page; expected one, or a report in JSON";
@@ -391,10 +388,10 @@ pub fn unknown_ending(path: &Path, known: &str) -> Failure {
 
 /// Checks that a file's ending promises a format that holds single precision.
 pub fn check_potential(path: &Path) -> Result<(), Failure> {
-    use ImageFormat::{Nifti, NiftiGz, Npy, Raw, Tiff};
+    use ImageFormat::{Nifti, NiftiGz, Npy, Nrrd, Raw, Tiff, Vti};
     match ImageFormat::from_path(path) {
-        Some(Npy | Nifti | NiftiGz | Tiff | Raw) => Ok(()),
-        _ => Err(unknown_ending(path, ".npy, .nii, .nii.gz, .tif, .raw")),
+        Some(Npy | Nifti | NiftiGz | Nrrd | Vti | Tiff | Raw) => Ok(()),
+        _ => Err(unknown_ending(path, ".npy, .nii, .nii.gz, .nrrd, .vti, .tif, .raw")),
     }
 }
 

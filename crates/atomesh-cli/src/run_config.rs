@@ -25,8 +25,9 @@ const MOST_STEPS: u64 = 10;
 section! {
     /// The files that a mesh is made from.
     pub struct InputOptions {
-        /// Image to mesh: .png .jpg .pgm .tif .npy .nii .nii.gz .segy .rsf, or raw samples with --shape and
-        /// --dtype. Two axes make triangles, three make tetrahedra
+        /// Image to mesh: .png .jpg .pgm .tif .npy .nii .nii.gz .nrrd .mha .vti .segy .rsf, a folder of
+        /// DICOM slices, or raw samples with --shape and --dtype. Two axes make triangles, three make
+        /// tetrahedra
         #[arg(value_name = "IMAGE", help_heading = "Arguments")]
         pub image: PathBuf,
         /// Image potential b(x) to use as it is, values in -1 (attracts) to 1 (repels), instead of
@@ -346,7 +347,8 @@ section! {
         /// The same figures with a picture and histograms, as one HTML page that needs no other file
         #[arg(long, value_name = "HTML")]
         pub html: PathBuf,
-        /// Potential that the atoms felt: .npy (axes z, y, x), .nii, .nii.gz, .tif or .raw, float32
+        /// Potential that the atoms felt: .npy (axes z, y, x), .nii, .nii.gz, .nrrd, .vti, .tif
+        /// or .raw, float32. .nii, .nrrd and .vti keep the frame
         #[arg(long, value_name = "FILE")]
         pub write_potential: PathBuf,
     }

@@ -35,10 +35,12 @@ fn bytes_of(name: &str) -> Vec<u8> {
     std::fs::read(path).unwrap()
 }
 
-const WRITTEN: [(&str, ImageFormat); 5] = [
+const WRITTEN: [(&str, ImageFormat); 7] = [
     ("v.npy", ImageFormat::Npy),
     ("v.nii", ImageFormat::Nifti),
     ("v.nii.gz", ImageFormat::NiftiGz),
+    ("v.nrrd", ImageFormat::Nrrd),
+    ("v.vti", ImageFormat::Vti),
     ("v.tif", ImageFormat::Tiff),
     ("f.png", ImageFormat::Png),
 ];
@@ -65,13 +67,31 @@ fn every_listed_ending_is_known() {
 }
 
 #[test]
+fn formats_that_hold_a_frame_say_so() {
+    // a folder is one of DICOM slices
+    let framed = [".nii", ".nii.gz", ".dcm", ".mha", ".mhd", ".nrrd", ".nhdr", ".vti"];
+    let deep = [".sgy", ".segy", ".rsf"];
+    for ending in framed.iter().chain(&deep).chain(&[".png", ".tif", ".npy", ".raw"]) {
+        let name = format!("scan{ending}");
+        let format = ImageFormat::of(Path::new(&name)).unwrap();
+        let has_frame = framed.contains(ending) || deep.contains(ending);
+        assert_eq!(format.has_frame(), has_frame, "{ending}");
+        assert_eq!(format.z_is_height(), framed.contains(ending), "{ending}");
+    }
+    let folder = tempfile::tempdir().unwrap();
+    assert_eq!(ImageFormat::of(folder.path()), Some(ImageFormat::Dicom));
+}
+
+#[test]
 fn missing_files_folders_and_empty_files_are_named() {
     let folder = tempfile::tempdir().unwrap();
     let missing = read(&folder.path().join("no.png")).unwrap_err().to_string();
     assert!(missing.contains("no.png") && missing.contains("cannot be read"), "{missing}");
     let inside = folder.path().join("folder.npy");
     std::fs::create_dir(&inside).unwrap();
-    assert!(matches!(read(&inside).unwrap_err().reason, ReadReason::Io(_)));
+    let error = read(&inside).unwrap_err();
+    assert!(matches!(error.reason, ReadReason::Series(_)), "{error}");
+    assert!(error.to_string().contains("folder.npy"), "{error}");
     for ending in ImageFormat::EXTENSIONS {
         let empty = folder.path().join(format!("empty{ending}"));
         std::fs::write(&empty, "").unwrap();
@@ -85,7 +105,10 @@ fn files_under_a_wrong_name_are_refused_with_a_hint() {
     let folder = tempfile::tempdir().unwrap();
     for (written, _) in WRITTEN {
         let bytes = bytes_of(written);
-        for ending in [".png", ".jpg", ".pgm", ".tif", ".npy", ".nii", ".nii.gz"] {
+        for ending in [
+            ".png", ".jpg", ".pgm", ".tif", ".npy", ".nii", ".nii.gz", ".dcm", ".mha", ".nrrd",
+            ".vti",
+        ] {
             if written.ends_with(ending) {
                 continue;
             }
@@ -130,8 +153,14 @@ fn raw_files_need_a_layout() {
 fn cut_files_are_refused_wherever_they_end() {
     for (name, format) in WRITTEN {
         let bytes = bytes_of(name);
-        // PNG's last chunk, IEND, carries no samples: its 12 bytes may be missing in part
-        let least = if format == ImageFormat::Png { bytes.len() - 16 } else { bytes.len() };
+        let unneeded = match format {
+            // PNG's last chunk, IEND, carries no samples: its 12 bytes may be missing in part
+            ImageFormat::Png => 16,
+            // nor do the tags that close a VTI file
+            ImageFormat::Vti => b"\n</AppendedData>\n</VTKFile>\n".len(),
+            _ => 0,
+        };
+        let least = bytes.len() - unneeded;
         for length in 1..least {
             let cut = decode_image(&bytes[..length], format, &ReadOptions::default(), &mut Silent);
             assert!(cut.is_err(), "{name} cut to {length} of {} bytes", bytes.len());
@@ -144,7 +173,7 @@ fn nan_is_kept_and_counted() {
     let samples = Samples::F32(vec![1.0, f32::NAN, f32::INFINITY, -2.0]);
     let image = Image::new(Frame::new([2, 2, 1]).unwrap(), samples).unwrap();
     let folder = tempfile::tempdir().unwrap();
-    for name in ["v.npy", "v.nii", "v.nii.gz"] {
+    for name in ["v.npy", "v.nii", "v.nii.gz", "v.nrrd"] {
         let path = folder.path().join(name);
         write_image(&path, &image, &mut Silent).unwrap();
         let read = read(&path).unwrap();
@@ -159,7 +188,7 @@ fn nan_is_kept_and_counted() {
 fn rows_columns_and_constant_images_are_read() {
     let folder = tempfile::tempdir().unwrap();
     for (nx, ny) in [(1, 1), (1, 40), (40, 1)] {
-        for name in ["f.npy", "f.nii", "f.nii.gz", "f.tif", "f.png"] {
+        for name in ["f.npy", "f.nii", "f.nii.gz", "f.nrrd", "f.vti", "f.tif", "f.png"] {
             let path = folder.path().join(name);
             let samples = Samples::U8(vec![7; nx * ny]);
             let image = Image::new(Frame::new([nx, ny]).unwrap(), samples.clone()).unwrap();
@@ -170,7 +199,7 @@ fn rows_columns_and_constant_images_are_read() {
     }
     // far more samples than bytes, as constant images compress
     let wide = Image::new(Frame::new([2000, 1000]).unwrap(), Samples::U8(vec![7; 2_000_000]));
-    for name in ["f.nii.gz", "f.png"] {
+    for name in ["f.nii.gz", "f.nrrd", "f.vti", "f.png"] {
         let path = folder.path().join(name);
         write_image(&path, wide.as_ref().unwrap(), &mut Silent).unwrap();
         assert_eq!(read(&path).unwrap().shape(), [2000, 1000], "{name}");
@@ -180,7 +209,7 @@ fn rows_columns_and_constant_images_are_read() {
 #[test]
 fn places_and_types_that_cannot_be_written_are_refused() {
     let folder = tempfile::tempdir().unwrap();
-    for ending in [".npy", ".nii", ".nii.gz", ".png", ".tif", ".raw"] {
+    for ending in [".npy", ".nii", ".nii.gz", ".nrrd", ".vti", ".png", ".tif", ".raw"] {
         let nowhere = folder.path().join("none").join(format!("f{ending}"));
         let error = write_image(&nowhere, &flat(2, 2), &mut Silent).unwrap_err();
         assert!(error.to_string().contains("cannot be written"), "{error}");
@@ -232,7 +261,7 @@ fn the_watch_ends_reading_and_writing_at_any_point() {
     let image = Image::new(Frame::new([side, side]).unwrap(), Samples::U16(samples.collect()));
     let image = image.unwrap();
     let folder = tempfile::tempdir().unwrap();
-    for name in ["f.npy", "f.nii", "f.nii.gz", "f.tif", "f.png"] {
+    for name in ["f.npy", "f.nii", "f.nii.gz", "f.nrrd", "f.vti", "f.tif", "f.png"] {
         let path = folder.path().join(name);
         write_image(&path, &image, &mut Silent).unwrap();
         for share in [0.0, 0.5] {

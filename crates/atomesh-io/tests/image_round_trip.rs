@@ -57,6 +57,57 @@ fn nifti_keeps_an_asymmetric_frame_and_every_type() {
     }
 }
 
+/// A frame whose numbers have no short form, turned about all axes.
+fn oblique() -> Frame<3> {
+    let ([s, c], [t, d]) = [0.3f64, 1.1].map(|a| [a.sin(), a.cos()]).into();
+    let direction = [[c * d, -s, c * t], [s * d, c, s * t], [-t, 0.0, d]];
+    let frame = Frame::new([4, 3, 2]).unwrap().with_direction(direction).unwrap();
+    frame
+        .with_spacing([0.1, 1.0 / 3.0, 4e-3])
+        .unwrap()
+        .with_origin([-98.1, 1e6 / 7.0, 0.7])
+        .unwrap()
+}
+
+#[test]
+fn nrrd_and_vti_keep_any_frame_and_every_type() {
+    for frame in [asymmetric(), mirrored_back(asymmetric()), oblique(), mirrored_back(oblique())] {
+        for samples in every_type() {
+            for name in ["v.nrrd", "v.vti"] {
+                let image = Image::new(frame, samples.clone()).unwrap();
+                let AnyImage::Volume(back) = read_back(&image, name) else { panic!("flat") };
+                assert_eq!(back.samples(), &samples, "{name}");
+                let back = back.frame();
+                assert_eq!(
+                    (back.shape(), back.origin()),
+                    (frame.shape(), frame.origin()),
+                    "{name}"
+                );
+                // a direction times a spacing and their quotient are rounded, three times at most
+                for c in 0..3 {
+                    let error = (back.spacing()[c] / frame.spacing()[c] - 1.0).abs();
+                    assert!(error <= 4.0 * f64::EPSILON, "{name} {error:e}");
+                    for r in 0..3 {
+                        let error = (back.direction()[r][c] - frame.direction()[r][c]).abs();
+                        assert!(error <= 4.0 * f64::EPSILON, "{name} {error:e}");
+                    }
+                }
+            }
+        }
+    }
+}
+
+#[test]
+fn frames_along_the_axes_are_exact_in_nrrd_and_vti() {
+    let frame = Frame::new([4, 3, 2]).unwrap().with_spacing([0.1, 1.0 / 3.0, 12.5]).unwrap();
+    let frame = frame.with_origin([0.1, -0.2, 1e-7]).unwrap();
+    let image = Image::new(frame, Samples::U8((0..24).collect())).unwrap();
+    for name in ["v.nrrd", "v.vti"] {
+        let AnyImage::Volume(back) = read_back(&image, name) else { panic!("flat") };
+        assert_eq!(back.frame(), &frame, "{name}");
+    }
+}
+
 /// The frame with its z axis turned round: of the other handedness.
 fn mirrored_back(frame: Frame<3>) -> Frame<3> {
     let mut direction = frame.direction();
@@ -89,7 +140,7 @@ fn qform_alone_gives_the_same_frame() {
 }
 
 #[test]
-fn a_flat_frame_survives_in_nifti() {
+fn a_flat_frame_survives_wherever_there_is_room_for_it() {
     let frame = Frame::new([6, 4])
         .unwrap()
         .with_spacing([12.5, 4.0])
@@ -99,9 +150,11 @@ fn a_flat_frame_survives_in_nifti() {
         .with_direction([[0.0, 1.0], [1.0, 0.0]])
         .unwrap();
     let image = Image::new(frame, Samples::F32((0..24).map(|k| k as f32).collect())).unwrap();
-    let AnyImage::Flat(back) = read_back(&image, "flat.nii.gz") else { panic!("volume") };
-    assert_eq!(back.frame(), &frame);
-    assert_eq!(back.samples(), image.samples());
+    for name in ["flat.nii.gz", "flat.nrrd", "flat.vti"] {
+        let AnyImage::Flat(back) = read_back(&image, name) else { panic!("volume") };
+        assert_eq!(back.frame(), &frame, "{name}");
+        assert_eq!(back.samples(), image.samples(), "{name}");
+    }
 }
 
 #[test]
@@ -134,7 +187,7 @@ fn frameless_formats_keep_the_samples_alone() {
 fn the_same_image_gives_the_same_bytes() {
     let image = Image::new(asymmetric(), Samples::I16((0..24).collect())).unwrap();
     let folder = tempfile::tempdir().unwrap();
-    for name in ["v.nii.gz", "v.nii", "v.npy", "v.tif", "v.raw"] {
+    for name in ["v.nii.gz", "v.nii", "v.npy", "v.nrrd", "v.vti", "v.tif", "v.raw"] {
         let (a, b) = (folder.path().join(format!("a-{name}")), folder.path().join(name));
         write_image(&a, &image, &mut Silent).unwrap();
         write_image(&b, &image, &mut Silent).unwrap();

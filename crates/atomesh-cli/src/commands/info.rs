@@ -23,6 +23,7 @@ use crate::mesh_file;
 #[command(after_help = "\
 Examples:
   atomesh info brain.nii.gz
+  atomesh info folder-of-dicom-slices
   atomesh info line.segy --vertical depth
   atomesh info mesh.vtu
   atomesh info cube.raw --shape 300,200,100 --dtype float32")]

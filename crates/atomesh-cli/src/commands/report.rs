@@ -179,8 +179,7 @@ fn write_html<const D: usize>(
     let mesh = lattice_mesh(&loaded.mesh, image.frame(), Units::Samples);
     let shown = args.image.as_ref().unwrap_or(&args.potential);
     // in these formats z grows upward
-    let is_height =
-        matches!(ImageFormat::from_path(shown), Some(ImageFormat::Nifti | ImageFormat::NiftiGz));
+    let is_height = ImageFormat::of(shown).is_some_and(ImageFormat::z_is_height);
     let z_up = is_height && image.frame().direction()[D - 1][D - 1] > 0.0;
     let style = Style { units, z_up, ..Style::default() };
     let made = loaded.provenance.as_ref();

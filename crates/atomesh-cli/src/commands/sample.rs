@@ -204,8 +204,7 @@ fn read<const D: usize>(
         let message = format!("has {axes} axes; the mesh is made of {cells}");
         return Err(Failure::content(message).about(path));
     };
-    let has_frame =
-        matches!(ImageFormat::from_path(path), Some(ImageFormat::Nifti | ImageFormat::NiftiGz));
+    let has_frame = ImageFormat::of(path).is_some_and(ImageFormat::has_frame);
     let known: Option<Frame<D>> =
         loaded.frame.filter(|f| !has_frame && f.shape() == image.frame().shape());
     let frame = known.unwrap_or(*image.frame());

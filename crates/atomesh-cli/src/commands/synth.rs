@@ -30,7 +30,8 @@ pub struct SynthArgs {
     /// What to draw. 2-D: faults, disc, slit, grains, section, section-faults; 3-D: the rest
     #[arg(value_name = "SCENE", value_parser = scene())]
     scene: Scene,
-    /// Image to write: .png .npy .nii .nii.gz .tif .raw. The frame is kept by .nii and .nii.gz only
+    /// Image to write: .png .npy .nii .nii.gz .nrrd .vti .tif .raw. The frame is kept by .nii, .nii.gz,
+    /// .nrrd and .vti only
     #[arg(short, long, value_name = "IMAGE")]
     output: PathBuf,
     /// Samples along x, y (and z), 8 or more each. Default: 256,256 or 96,96,96
@@ -62,11 +63,11 @@ fn scene() -> impl TypedValueParser<Value = Scene> {
 /// # Errors
 /// [`Failure`] if an option is out of its range or a file cannot be written.
 pub fn run(args: &SynthArgs, watch: &mut Progress) -> Result<String, Failure> {
-    use ImageFormat::{Nifti, NiftiGz, Npy, Png, Raw, Tiff};
+    use ImageFormat::{Nifti, NiftiGz, Npy, Nrrd, Png, Raw, Tiff, Vti};
     let format = ImageFormat::from_path(&args.output);
-    if !matches!(format, Some(Png | Npy | Nifti | NiftiGz | Tiff | Raw)) {
+    if !matches!(format, Some(Png | Npy | Nifti | NiftiGz | Nrrd | Vti | Tiff | Raw)) {
         let message = "the ending says no format that is written; \
-             expected one of .png, .npy, .nii, .nii.gz, .tif, .raw";
+             expected one of .png, .npy, .nii, .nii.gz, .nrrd, .vti, .tif, .raw";
         return Err(Failure::misuse(message).about(&args.output));
     }
     let bytes = args.bytes || format == Some(Png);

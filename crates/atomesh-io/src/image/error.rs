@@ -7,7 +7,7 @@ use std::path::PathBuf;
 use atomesh::image::FrameError;
 use atomesh::watch::Cancelled;
 
-use super::{ImageFormat, SampleType};
+use super::{ImageFormat, SampleType, SeriesError};
 
 /// An image could not be read; the message names the file and the reason.
 #[derive(Debug, thiserror::Error)]
@@ -155,6 +155,17 @@ pub enum ReadReason {
         /// Samples along the axes given.
         shape: Vec<usize>,
     },
+    /// The files of a folder are not one volume.
+    #[error(transparent)]
+    Series(#[from] SeriesError),
+    /// A file of a folder cannot be read.
+    #[error("{file}: {reason}")]
+    Slice {
+        /// The file's name.
+        file: String,
+        /// What is wrong with it.
+        reason: Box<ReadReason>,
+    },
     /// Two traces of a seismic file have the same numbers.
     #[error("traces {first} and {second} both are {number}; expected one trace for each")]
     DuplicateTraces {
@@ -251,7 +262,7 @@ pub enum WriteReason {
     /// The file's name ends like no format that can be written.
     #[error(
         "no image can be written by the ending {extension:?}; writable are \
-         .npy .nii .nii.gz .png .tif .tiff .raw"
+         .npy .nii .nii.gz .nrrd .vti .png .tif .tiff .raw"
     )]
     UnknownExtension {
         /// The ending found, empty if there is none.

@@ -10,15 +10,36 @@
 //! | TIFF | tif tiff | integers, floats; many pages are a volume | none |
 //! | NPY | npy | every real type; arrays (y, x) or (z, y, x) | none |
 //! | NIfTI-1 | nii nii.gz | every real type; one volume | sform, else qform, else spacing |
+//! | DICOM | a folder of slices, dcm | integers, rescaled to float32 | LPS turned to RAS |
+//! | MetaImage | mha, mhd | every real type; zlib | LPS turned to RAS where the file speaks of a body |
+//! | NRRD | nrrd, nhdr | every real type; gzip, ascii | LPS, LAS turned to RAS; others as they are |
+//! | VTI | vti | every real type; zlib, base64, ascii | as it is |
 //! | SEG-Y | sgy segy | IBM and IEEE floats, integers; lines and cubes | by coordinates and interval |
 //! | RSF | rsf | floats, integers; native, XDR, ASCII | o and d of each axis |
 //! | raw | raw, or any with a layout | every real type | none |
+//!
+//! World coordinates are those that the file states, with one exception. Files of bodies state them in
+//! RAS (x to the right, y to the front, z to the head: NIfTI) or in LPS (x to the left, y to the back:
+//! DICOM, and what ITK writes), half a turn apart. All of these are read as RAS, so that a scan lies in
+//! the same place whatever file it comes in:
+//!
+//! | file | its world | read as |
+//! | --- | --- | --- |
+//! | NIfTI-1 | RAS | it stands |
+//! | DICOM | LPS | turned to RAS |
+//! | NRRD, `space` right-, left-anterior-superior, left-posterior-superior | as named | turned to RAS |
+//! | NRRD, any other `space` or none | unknown | it stands |
+//! | MetaImage with `AnatomicalOrientation` or a medical `Modality` | LPS | turned to RAS |
+//! | MetaImage with neither | unknown | it stands |
+//! | VTI | unknown | it stands |
+//!
+//! Meshes and images are written in the same coordinates: NIfTI and NRRD say RAS, VTI and mesh formats
+//! have no word for it. Flat images of NRRD and MetaImage stand as they are, unless they name a body.
 //!
 //! An image without a frame has unit spacing and origin 0: the resolution that a PNG, JPEG or TIFF
 //! states is one of printing.
 
 use std::cell::Cell;
-use std::fmt;
 use std::fs::File;
 use std::io::{Cursor, Read, Seek};
 use std::path::Path;
@@ -28,21 +49,32 @@ use atomesh::watch::{Cancelled, Phase, Watch, check};
 
 use crate::atomic_file::AtomicFile;
 
+mod affine;
+mod dicom;
 mod error;
+mod format;
+mod metaimage;
 mod nifti;
 mod note;
 mod npy;
+mod nrrd;
+mod payload;
 mod raster;
 mod raw;
 mod rsf;
 mod sample_type;
 mod segy;
 mod stream;
+mod text;
 mod tiff;
 mod traces;
+mod vti;
 mod watched;
 
+pub use dicom::SeriesError;
 pub use error::{ReadError, ReadReason, WriteError, WriteReason};
+pub use format::ImageFormat;
+use format::extension;
 pub use note::{LoadedImage, ReadNote};
 pub use raw::RawLayout;
 pub use sample_type::{ByteOrder, SampleType, UnknownByteOrder, UnknownSampleType};
@@ -119,103 +151,6 @@ impl AnyImage {
     }
 }
 
-/// The image formats that are read.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
-#[non_exhaustive]
-pub enum ImageFormat {
-    /// Portable Network Graphics.
-    Png,
-    /// JPEG.
-    Jpeg,
-    /// The Netpbm family: PBM, PGM, PPM, PAM.
-    Pnm,
-    /// Tagged Image File Format, also BigTIFF.
-    Tiff,
-    /// NumPy's array file.
-    Npy,
-    /// NIfTI-1 in one file, `.nii`.
-    Nifti,
-    /// The same compressed by gzip, `.nii.gz`.
-    NiftiGz,
-    /// SEG-Y, revisions 0 to 2.
-    Segy,
-    /// Madagascar's regularly sampled format.
-    Rsf,
-    /// Samples and nothing else.
-    Raw,
-}
-
-impl ImageFormat {
-    /// The endings by which formats are known.
-    pub const EXTENSIONS: [&str; 17] = [
-        ".png", ".jpg", ".jpeg", ".pnm", ".pgm", ".ppm", ".pbm", ".pam", ".tif", ".tiff", ".npy",
-        ".nii", ".nii.gz", ".sgy", ".segy", ".rsf", ".raw",
-    ];
-
-    /// The format that a file's name promises, in upper or lower case; none if it is not known.
-    pub fn from_path(path: &Path) -> Option<Self> {
-        Some(match extension(path).as_str() {
-            ".png" => Self::Png,
-            ".jpg" | ".jpeg" => Self::Jpeg,
-            ".pnm" | ".pgm" | ".ppm" | ".pbm" | ".pam" => Self::Pnm,
-            ".tif" | ".tiff" => Self::Tiff,
-            ".npy" => Self::Npy,
-            ".nii" => Self::Nifti,
-            ".nii.gz" => Self::NiftiGz,
-            ".sgy" | ".segy" => Self::Segy,
-            ".rsf" => Self::Rsf,
-            ".raw" => Self::Raw,
-            _ => return None,
-        })
-    }
-
-    /// Whether a file of this format may begin with these bytes. NIfTI's magic stands further
-    /// behind, so its reader looks for it.
-    fn may_begin_with(self, head: &[u8]) -> bool {
-        match self {
-            Self::Png => head.starts_with(b"\x89PNG\r\n\x1a\n"),
-            Self::Jpeg => head.starts_with(b"\xff\xd8\xff"),
-            Self::Pnm => matches!(head, [b'P', b'1'..=b'7', ..]),
-            Self::Tiff => {
-                matches!(head, [b'I', b'I', 42 | 43, 0, ..] | [b'M', b'M', 0, 42 | 43, ..])
-            }
-            Self::Npy => head.starts_with(b"\x93NUMPY"),
-            Self::Nifti => !head.starts_with(b"\x1f\x8b"),
-            Self::NiftiGz => head.starts_with(b"\x1f\x8b"),
-            Self::Segy | Self::Rsf | Self::Raw => true,
-        }
-    }
-}
-
-impl fmt::Display for ImageFormat {
-    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        f.write_str(match self {
-            Self::Png => "PNG",
-            Self::Jpeg => "JPEG",
-            Self::Pnm => "PNM",
-            Self::Tiff => "TIFF",
-            Self::Npy => "NPY",
-            Self::Nifti => "NIfTI-1",
-            Self::NiftiGz => "gzipped NIfTI-1",
-            Self::Segy => "SEG-Y",
-            Self::Rsf => "RSF",
-            Self::Raw => "raw",
-        })
-    }
-}
-
-/// The ending of a file's name in lower case with its dot, `.nii.gz` as one; empty if there is none.
-fn extension(path: &Path) -> String {
-    let of = |p: &Path| match p.extension() {
-        Some(e) => format!(".{}", e.to_string_lossy().to_lowercase()),
-        None => String::new(),
-    };
-    match of(path).as_str() {
-        ".gz" => path.file_stem().map(|s| of(Path::new(s))).unwrap_or_default() + ".gz",
-        other => other.into(),
-    }
-}
-
 /// How to read an image.
 #[derive(Clone, Debug, Default)]
 pub struct ReadOptions {
@@ -261,7 +196,7 @@ pub fn load_image(
     watch: &mut dyn Watch,
 ) -> Result<LoadedImage, ReadError> {
     let mut read = || {
-        let format = match (&options.raw, ImageFormat::from_path(path)) {
+        let format = match (&options.raw, ImageFormat::of(path)) {
             (Some(_), _) => ImageFormat::Raw,
             (None, Some(format)) => format,
             (None, None) => {
@@ -270,6 +205,9 @@ pub fn load_image(
         };
         let file = File::open(path).map_err(ReadReason::Io)?;
         let metadata = file.metadata().map_err(ReadReason::Io)?;
+        if metadata.is_dir() && format == ImageFormat::Dicom {
+            return dicom::read_folder(path, watch);
+        }
         if metadata.is_dir() {
             return Err(ReadReason::Io(std::io::ErrorKind::IsADirectory.into()));
         }
@@ -327,34 +265,32 @@ fn decode<R: Read + Seek>(
 
     let cancelled = Cell::new(false);
     let source = Watched::new(source, file_bytes, watch, &cancelled);
-    let image = match format {
-        // these say more than the image
-        ImageFormat::Segy => {
-            let loaded = segy::read(source, file_bytes, &options.segy);
-            return if cancelled.get() { Err(Cancelled.into()) } else { loaded };
-        }
-        ImageFormat::Rsf => {
-            let loaded = rsf::read(source, file_bytes, folder, options.segy.vertical);
-            return if cancelled.get() { Err(Cancelled.into()) } else { loaded };
-        }
+    let loaded = match format {
         ImageFormat::Png | ImageFormat::Jpeg | ImageFormat::Pnm => {
-            raster::read(source, file_bytes, format)
+            raster::read(source, file_bytes, format).map(LoadedImage::from)
         }
-        ImageFormat::Tiff => tiff::read(source, file_bytes),
-        ImageFormat::Npy => npy::read(source, file_bytes),
-        ImageFormat::Nifti => nifti::read(source, file_bytes),
-        ImageFormat::NiftiGz => nifti::read_gzipped(source, file_bytes),
+        ImageFormat::Tiff => tiff::read(source, file_bytes).map(LoadedImage::from),
+        ImageFormat::Npy => npy::read(source, file_bytes).map(LoadedImage::from),
+        ImageFormat::Nifti => nifti::read(source, file_bytes).map(LoadedImage::from),
+        ImageFormat::NiftiGz => nifti::read_gzipped(source, file_bytes).map(LoadedImage::from),
+        ImageFormat::Dicom => dicom::read(source, file_bytes),
+        ImageFormat::MetaImage => metaimage::read(source, file_bytes, folder),
+        ImageFormat::Nrrd => nrrd::read(source, file_bytes, folder),
+        ImageFormat::Vti => vti::read(source, file_bytes),
+        ImageFormat::Segy => segy::read(source, file_bytes, &options.segy),
+        ImageFormat::Rsf => rsf::read(source, file_bytes, folder, options.segy.vertical),
         ImageFormat::Raw => match &options.raw {
-            Some(layout) => raw::read(source, file_bytes, layout),
+            Some(layout) => raw::read(source, file_bytes, layout).map(LoadedImage::from),
             None => Err(ReadReason::NoRawLayout),
         },
     };
-    if cancelled.get() { Err(Cancelled.into()) } else { image.map(LoadedImage::from) }
+    if cancelled.get() { Err(Cancelled.into()) } else { loaded }
 }
 
 /// Writes an image in the format that the file's name promises: NPY (array (y, x) or (z, y, x)),
 /// NIfTI-1 with the frame as sform and qform, PNG (flat, `uint8` and `uint16`), TIFF (a page for
-/// each z), or raw (least significant byte first). Only NIfTI-1 keeps the frame.
+/// each z), NRRD and VTI with the frame, or raw (least significant byte first). NIfTI-1 keeps the
+/// frame in single precision, NRRD and VTI keep it exactly, the others have no room for it.
 ///
 /// The file appears when all is written, or not at all; it holds no time and no name.
 ///
@@ -376,8 +312,15 @@ pub fn write_image<const D: usize>(
             ImageFormat::Npy => npy::write(&mut file, image, watch)?,
             ImageFormat::Nifti => nifti::write(&mut file, image, watch)?,
             ImageFormat::NiftiGz => nifti::write_gzipped(&mut file, image, watch)?,
+            ImageFormat::Nrrd => nrrd::write(&mut file, image, watch)?,
+            ImageFormat::Vti => vti::write(&mut file, image, watch)?,
             ImageFormat::Raw => stream::write_samples(&mut file, image.samples(), format, watch)?,
-            ImageFormat::Jpeg | ImageFormat::Pnm | ImageFormat::Segy | ImageFormat::Rsf => {
+            ImageFormat::Dicom
+            | ImageFormat::Jpeg
+            | ImageFormat::MetaImage
+            | ImageFormat::Pnm
+            | ImageFormat::Segy
+            | ImageFormat::Rsf => {
                 return Err(unknown());
             }
         }

@@ -15,6 +15,14 @@ pub struct LoadedImage {
     pub notes: Vec<ReadNote>,
 }
 
+impl LoadedImage {
+    /// The same with one note more, if there is one.
+    pub(super) fn noting(mut self, note: impl Into<Option<ReadNote>>) -> Self {
+        self.notes.extend(note.into());
+        self
+    }
+}
+
 impl From<AnyImage> for LoadedImage {
     fn from(image: AnyImage) -> Self {
         Self { image, units: Vec::new(), notes: Vec::new() }
@@ -96,6 +104,13 @@ pub enum ReadNote {
         /// Whether a label said which axis is vertical.
         is_known: bool,
     },
+    /// World coordinates of a body are turned to RAS.
+    Turned {
+        /// What they are in the file, as in `LPS`.
+        from: &'static str,
+    },
+    /// Values are those of cells; the samples are their middles.
+    Cells,
 }
 
 impl ReadNote {
@@ -103,7 +118,12 @@ impl ReadNote {
     pub fn is_warning(&self) -> bool {
         !matches!(
             self,
-            Self::Traces { .. } | Self::Line { .. } | Self::Vertical { .. } | Self::Axes { .. }
+            Self::Traces { .. }
+                | Self::Line { .. }
+                | Self::Vertical { .. }
+                | Self::Axes { .. }
+                | Self::Turned { .. }
+                | Self::Cells
         )
     }
 }
@@ -158,6 +178,10 @@ impl fmt::Display for ReadNote {
                 let guess = ", in its order since no label says depth or time";
                 if *is_known { Ok(()) } else { f.write_str(guess) }
             }
+            Self::Turned { from } => write!(f, "coordinates are turned from {from} to RAS"),
+            Self::Cells => f.write_str(
+                "values are those of cells; samples sit in their middles, half a step on",
+            ),
         }
     }
 }

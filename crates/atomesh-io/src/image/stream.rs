@@ -11,6 +11,9 @@ use atomesh::watch::{Phase, Watch, check};
 
 use super::{ByteOrder, ReadReason, SampleType, WriteReason};
 
+/// The most bytes that a byte of gzip or zlib can stand for.
+pub(super) const GZIP_RATIO: u64 = 1032;
+
 /// Samples that pass through the buffer at a time.
 const BLOCK: usize = 1 << 16;
 

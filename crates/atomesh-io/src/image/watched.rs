@@ -30,6 +30,11 @@ impl<'a, R> Watched<'a, R> {
     ) -> Self {
         Self { inner, watch, cancelled, file_bytes, read_bytes: 0, next_look: 0 }
     }
+
+    /// Goes on with another reader, of `file_bytes` bytes, for the same watch.
+    pub fn over<S>(self, inner: S, file_bytes: u64) -> Watched<'a, S> {
+        Watched::new(inner, file_bytes, self.watch, self.cancelled)
+    }
 }
 
 impl<R: Read> Read for Watched<'_, R> {

@@ -4,9 +4,9 @@ use std::io::Read;
 
 use atomesh::image::Frame;
 
+use super::super::affine::{self, Affine};
 use super::super::stream;
 use super::super::{ByteOrder, ImageFormat, ReadReason, SampleType, WriteReason};
-use super::affine::{self, Affine};
 
 /// The bytes of a header.
 pub(super) const BYTES: usize = 348;

@@ -11,18 +11,15 @@ use atomesh::watch::Watch;
 use flate2::read::MultiGzDecoder;
 use flate2::write::GzEncoder;
 
-use super::stream::{self, Layout};
+use super::affine;
+use super::stream::{self, GZIP_RATIO, Layout};
 use super::{AnyImage, ImageFormat, ReadReason, WriteReason};
 
-mod affine;
 mod header;
 
-use header::{Header, wrong};
+use header::Header;
 
 const FORMAT: ImageFormat = ImageFormat::Nifti;
-
-/// The most bytes that a byte of gzip can stand for.
-const GZIP_RATIO: u64 = 1032;
 
 /// Reads a `.nii` file.
 pub(super) fn read<R: Read + Seek>(mut source: R, file_bytes: u64) -> Result<AnyImage, ReadReason> {
@@ -71,18 +68,7 @@ fn samples_after(
         scale: header.scale,
         turned: None,
     };
-    // the frame is made first, so that a bad one is reported before the long read
-    match *header.shape {
-        [nx, ny] => {
-            let frame = affine::flat_frame([nx, ny], header.affine)?;
-            Ok(AnyImage::Flat(Image::new(frame, stream::read_samples(source, &layout)?)?))
-        }
-        [nx, ny, nz] => {
-            let frame = affine::frame([nx, ny, nz], header.affine)?;
-            Ok(AnyImage::Volume(Image::new(frame, stream::read_samples(source, &layout)?)?))
-        }
-        _ => Err(wrong("dim[0]", header.shape.len(), "2 or 3 axes")),
-    }
+    affine::image(FORMAT, &header.shape, header.affine, || stream::read_samples(source, &layout))
 }
 
 /// Writes a `.nii` file, the frame as sform and as qform (code 2, "aligned").

@@ -40,10 +40,17 @@ pub(crate) struct Head<'a> {
 impl<'a> Head<'a> {
     /// The beginning of a file of VTK's `kind`.
     pub fn new(kind: &'static str) -> Self {
+        Self::with_attributes(kind, "")
+    }
+
+    /// The same, with attributes of the tag that is named as the kind is.
+    pub fn with_attributes(kind: &'static str, attributes: &str) -> Self {
         let mut head = Self { kind, xml: Vec::new(), arrays: Vec::new() };
         head.text(&format!("<?xml version=\"1.0\"?>\n<VTKFile type=\"{kind}\" version=\"1.0\" "));
         head.text("byte_order=\"LittleEndian\" header_type=\"UInt64\" ");
-        head.text(&format!("compressor=\"vtkZLibDataCompressor\">\n<{kind}>\n"));
+        let gap = if attributes.is_empty() { "" } else { " " };
+        head.text("compressor=\"vtkZLibDataCompressor\">\n");
+        head.text(&format!("<{kind}{gap}{attributes}>\n"));
         head
     }
 

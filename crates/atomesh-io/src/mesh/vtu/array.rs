@@ -15,7 +15,7 @@ use super::super::read::{MeshReadError, excerpt, malformed};
 
 /// How the binary arrays of a file are laid out.
 #[derive(Clone, Copy, Debug)]
-pub(super) struct Layout {
+pub(crate) struct Layout {
     pub endian: Endian,
     /// Whether the words of headers have 8 bytes, not 4.
     pub wide_header: bool,
@@ -25,7 +25,7 @@ pub(super) struct Layout {
 
 /// Where the text or the bytes of an array begin.
 #[derive(Clone, Copy, Debug)]
-pub(super) enum Place {
+pub(crate) enum Place {
     /// Decimal numbers up to the next tag.
     Text(usize),
     /// base64 up to the next tag or other encoded array.
@@ -36,7 +36,7 @@ pub(super) enum Place {
 
 /// An array before its numbers are read.
 #[derive(Clone, Debug)]
-pub(super) struct Array<'a> {
+pub(crate) struct Array<'a> {
     pub file: &'a [u8],
     pub layout: Layout,
     pub place: Place,
@@ -122,7 +122,7 @@ impl Array<'_> {
     pub fn string(&self) -> Result<Vec<u8>, MeshReadError> {
         match self.place {
             Place::Text(at) => Ok(words(self.text(at)).filter_map(|w| w.parse().ok()).collect()),
-            _ => self.bytes(None),
+            _ => self.bytes(None).map(Cow::into_owned),
         }
     }
 
@@ -141,7 +141,7 @@ impl Array<'_> {
         malformed(self.start(), format!("{} in array {:?}", expected.into(), self.name), found)
     }
 
-    fn text(&self, at: usize) -> &str {
+    pub fn text(&self, at: usize) -> &str {
         let rest = self.file.get(at..).unwrap_or_default();
         let end = rest.iter().position(|&b| b == b'<').unwrap_or(rest.len());
         // numbers are ASCII: what comes after anything else is missed as missing numbers
@@ -184,8 +184,11 @@ impl Array<'_> {
     }
 
     /// The bytes of a binary array without its header; `size` of them, if that is known.
-    fn bytes(&self, size: Option<usize>) -> Result<Vec<u8>, MeshReadError> {
-        if self.layout.compressed { self.decompress(size) } else { self.uncompressed(size) }
+    pub fn bytes(&self, size: Option<usize>) -> Result<Cow<'_, [u8]>, MeshReadError> {
+        match self.layout.compressed {
+            true => self.decompress(size).map(Cow::Owned),
+            false => self.uncompressed(size),
+        }
     }
 
     fn check_size(&self, found: usize, size: Option<usize>) -> Result<(), MeshReadError> {
@@ -197,12 +200,18 @@ impl Array<'_> {
         }
     }
 
-    fn uncompressed(&self, size: Option<usize>) -> Result<Vec<u8>, MeshReadError> {
+    fn uncompressed(&self, size: Option<usize>) -> Result<Cow<'_, [u8]>, MeshReadError> {
         let word = self.word_size();
         let length = self.words(1)?[0];
         self.check_size(length, size)?;
         let stream = self.stream(length.checked_add(word).ok_or_else(|| self.too_long(length))?)?;
-        Ok(stream[word..].to_vec())
+        Ok(match stream {
+            Cow::Borrowed(stream) => Cow::Borrowed(&stream[word..]),
+            Cow::Owned(mut stream) => {
+                stream.drain(..word);
+                Cow::Owned(stream)
+            }
+        })
     }
 
     fn decompress(&self, size: Option<usize>) -> Result<Vec<u8>, MeshReadError> {

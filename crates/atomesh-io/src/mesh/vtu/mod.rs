@@ -1,12 +1,12 @@
 //! VTU, VTK's XML format for unstructured grids.
 
 pub(crate) mod appended;
-mod array;
+pub(crate) mod array;
 mod cells;
 pub(crate) mod poly;
-mod read;
+pub(crate) mod read;
 mod write;
-mod xml;
+pub(crate) mod xml;
 
 pub use cells::write_cells_vtu;
 pub use read::read_vtu;

@@ -29,14 +29,18 @@ pub fn read_vtu(bytes: &[u8]) -> Result<AnyMesh, MeshReadError> {
 }
 
 /// The arrays of a file, found but not read.
-pub(super) struct Document<'a> {
+pub(crate) struct Document<'a> {
+    /// The tag that is named as the kind is; image data have their frame there.
+    pub grid: Option<Tag<'a>>,
     pub field_data: Vec<Array<'a>>,
     pub pieces: Vec<Piece<'a>>,
 }
 
 #[derive(Default)]
-pub(super) struct Piece<'a> {
+pub(crate) struct Piece<'a> {
     pub at: usize,
+    /// The first and last point along each axis, in image data.
+    pub extent: &'a str,
     pub points: usize,
     /// The number of cells; in poly data that of lines and polygons.
     pub cells: usize,
@@ -46,7 +50,9 @@ pub(super) struct Piece<'a> {
     pub polygons: Vec<Array<'a>>,
     pub counts: [usize; 2],
     topology: Vec<Array<'a>>,
-    point_data: Vec<Array<'a>>,
+    /// The names of the point and cell arrays that are shown first, if the file says so.
+    pub scalars: [Option<&'a str>; 2],
+    pub point_data: Vec<Array<'a>>,
     pub cell_data: Vec<Array<'a>>,
 }
 
@@ -66,7 +72,7 @@ impl<'a> Document<'a> {
             _ => return Err(malformed(0, "<VTKFile>", excerpt(bytes, 0))),
         };
         let layout = layout(&root, kind)?;
-        let mut document = Self { field_data: vec![], pieces: vec![] };
+        let mut document = Self { grid: None, field_data: vec![], pieces: vec![] };
         let mut section = "";
         let mut appended = None;
         let mut pending = Vec::new();
@@ -79,7 +85,14 @@ impl<'a> Document<'a> {
                     }
                     "Piece" => document.pieces.push(Piece::new(&tag, kind)?),
                     "FieldData" | "PointData" | "CellData" | "Points" | "Cells" | "Lines"
-                    | "Polys" | "Verts" | "Strips" => section = tag.name,
+                    | "Polys" | "Verts" | "Strips" => {
+                        section = tag.name;
+                        let of = ["PointData", "CellData"].iter().position(|s| *s == section);
+                        if let (Some(of), Some(piece)) = (of, document.pieces.last_mut()) {
+                            piece.scalars[of] = tag.get("Scalars");
+                        }
+                    }
+                    name if name == kind => document.grid = Some(tag),
                     "DataArray" => {
                         pending.push((section, document.pieces.len(), tag, scanner.at()))
                     }
@@ -259,8 +272,12 @@ fn append<T: Clone>(fields: &mut Vec<OwnedField<T>>, more: Vec<OwnedField<T>>, f
     });
 }
 
-impl Piece<'_> {
-    fn new(tag: &Tag, kind: &str) -> Result<Self, MeshReadError> {
+impl<'a> Piece<'a> {
+    fn new(tag: &Tag<'a>, kind: &str) -> Result<Self, MeshReadError> {
+        if kind == "ImageData" {
+            let extent = tag.require("Extent")?;
+            return Ok(Self { at: tag.at, extent, ..Self::default() });
+        }
         let points = tag.count("NumberOfPoints")?;
         let mut piece = Self { at: tag.at, points, ..Self::default() };
         if kind == "PolyData" {

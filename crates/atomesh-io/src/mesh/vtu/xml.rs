@@ -5,7 +5,7 @@ use super::super::read::{MeshReadError, excerpt, malformed};
 
 /// An opening tag (or one that closes itself).
 #[derive(Clone, Debug)]
-pub(super) struct Tag<'a> {
+pub(crate) struct Tag<'a> {
     /// Where it begins.
     pub at: usize,
     pub name: &'a str,

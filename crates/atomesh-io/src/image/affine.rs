@@ -1,14 +1,36 @@
-//! From a NIfTI affine to a frame and back.
+//! From the affine of a header to a frame and back, and from the header's world to ours.
 
 use atomesh::geometry::dot;
-use atomesh::image::Frame;
+use atomesh::image::{Frame, Image, Samples};
 
-use super::super::ReadReason;
-use super::header::wrong;
+use super::{AnyImage, ImageFormat, ReadNote, ReadReason};
 
 /// The least |cosine| of the angle between two axes at which they count as sheared: what a
 /// [`Frame`] tolerates, 0.006 degrees.
 const SHEAR: f64 = 1e-4;
+
+/// Which way the axes of a header's world point. Ours is RAS, x to the right, y to the front, z to the
+/// top of the head, wherever a header speaks of a body; other coordinates stand as they are.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(super) enum World {
+    /// RAS, or no word of a body.
+    Ours,
+    /// LPS: x to the left, y to the back, z to the top of the head.
+    LeftPosterior,
+    /// LAS: x to the left, y to the front, z to the top of the head.
+    LeftAnterior,
+}
+
+impl World {
+    /// What the user should know of coordinates that were turned.
+    pub fn note(self) -> Option<ReadNote> {
+        match self {
+            Self::Ours => None,
+            Self::LeftPosterior => Some(ReadNote::Turned { from: "LPS" }),
+            Self::LeftAnterior => Some(ReadNote::Turned { from: "LAS" }),
+        }
+    }
+}
 
 /// Sample indices to world coordinates: `world = matrix · index + origin`.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -25,6 +47,21 @@ impl Affine {
         Self { matrix, origin: [0.0; 3] }
     }
 
+    /// The same samples in our world. LPS is RAS turned by half about z, so that nothing is mirrored.
+    pub fn from_world(mut self, world: World) -> Self {
+        let turned = match world {
+            World::Ours => 0,
+            World::LeftPosterior => 2,
+            World::LeftAnterior => 1,
+        };
+        for r in 0..turned {
+            // 0 − 0 is 0, where −0 would be printed with its sign
+            self.matrix[r] = self.matrix[r].map(|x| 0.0 - x);
+            self.origin[r] = 0.0 - self.origin[r];
+        }
+        self
+    }
+
     /// The affine of a frame; that of a flat one lies in the plane z = 0.
     pub fn of<const D: usize>(frame: &Frame<D>) -> Self {
         let mut affine = Self::scaling([1.0; 3]);
@@ -38,6 +75,40 @@ impl Affine {
     }
 }
 
+/// The image of the samples that `read` gives, placed by an affine. The frame is made first, so that
+/// a bad one is reported before the long read.
+///
+/// # Errors
+/// As [`frame`] and [`flat_frame`], and as `read` gives.
+pub(super) fn image(
+    format: ImageFormat,
+    shape: &[usize],
+    affine: Affine,
+    read: impl FnOnce() -> Result<Samples, ReadReason>,
+) -> Result<AnyImage, ReadReason> {
+    match *shape {
+        [nx, ny] => {
+            let frame = flat_frame(format, [nx, ny], affine)?;
+            Ok(AnyImage::Flat(Image::new(frame, read()?)?))
+        }
+        [nx, ny, nz] => {
+            let frame = frame(format, [nx, ny, nz], affine)?;
+            Ok(AnyImage::Volume(Image::new(frame, read()?)?))
+        }
+        _ => Err(wrong(format, "axes", shape.len().to_string(), "2 or 3")),
+    }
+}
+
+/// The error for an entry of a header.
+pub(super) fn wrong(
+    format: ImageFormat,
+    field: &'static str,
+    value: impl Into<String>,
+    expected: &'static str,
+) -> ReadReason {
+    ReadReason::Header { format, field, value: value.into(), expected }
+}
+
 /// The frame of an affine whose columns are at right angles: spacings are their lengths, directions
 /// the columns divided by those. Single precision leaves the directions askew by some 1e-7; they
 /// are turned to the nearest orthonormal ones, so that a frame maps there and back exactly.
@@ -45,6 +116,7 @@ impl Affine {
 /// # Errors
 /// If an entry is not finite, a column is zero, or two columns are not at right angles.
 pub(super) fn frame<const D: usize>(
+    format: ImageFormat,
     shape: [usize; D],
     affine: Affine,
 ) -> Result<Frame<D>, ReadReason> {
@@ -56,7 +128,7 @@ pub(super) fn frame<const D: usize>(
         if !(spacing[c].is_finite() && spacing[c] > 0.0) {
             const NAMES: [&str; 3] = ["affine column x", "affine column y", "affine column z"];
             let value = format!("{:?}", columns[c]);
-            return Err(wrong(NAMES[c], value, "finite numbers that are not all 0"));
+            return Err(wrong(format, NAMES[c], value, "finite numbers that are not all 0"));
         }
         columns[c] = columns[c].map(|x| x / spacing[c]);
     }
@@ -79,14 +151,19 @@ pub(super) fn frame<const D: usize>(
 ///
 /// # Errors
 /// As [`frame`], and if the plane is another one.
-pub(super) fn flat_frame(shape: [usize; 2], affine: Affine) -> Result<Frame<2>, ReadReason> {
+pub(super) fn flat_frame(
+    format: ImageFormat,
+    shape: [usize; 2],
+    affine: Affine,
+) -> Result<Frame<2>, ReadReason> {
     let rise = &affine.matrix[2][..2];
     let length = affine.matrix.iter().flat_map(|row| &row[..2]).fold(0.0, |m, x| x.abs().max(m));
     if rise.iter().any(|z| z.abs() > SHEAR * length) {
         let value = format!("{rise:?}");
-        return Err(wrong("affine row z", value, "0 for an image of two axes, in the plane x, y"));
+        let expected = "0 for an image of two axes, in the plane x, y";
+        return Err(wrong(format, "affine row z", value, expected));
     }
-    frame(shape, affine)
+    frame(format, shape, affine)
 }
 
 /// The orthonormal vectors nearest to `columns`, which are so within [`SHEAR`]: the limit of
@@ -117,7 +194,8 @@ pub(super) fn rotation(quaternion: [f64; 3]) -> Result<[[f64; 3]; 3], ReadReason
     let squared = dot(&quaternion, &quaternion);
     if squared.is_nan() || squared > 1.0 + 1e-5 {
         let value = format!("{quaternion:?}");
-        return Err(wrong("quatern_b, c, d", value, "numbers whose squares add up to at most 1"));
+        let expected = "numbers whose squares add up to at most 1";
+        return Err(wrong(ImageFormat::Nifti, "quatern_b, c, d", value, expected));
     }
     let scale = if squared > 1.0 { squared.sqrt().recip() } else { 1.0 };
     let [b, c, d] = quaternion.map(|q| q * scale);
@@ -158,6 +236,8 @@ mod tests {
     use super::*;
     use proptest::prelude::*;
 
+    const NIFTI: ImageFormat = ImageFormat::Nifti;
+
     #[test]
     fn quarter_turns_are_exact() {
         // about z: x goes to y
@@ -184,7 +264,7 @@ mod tests {
     fn shear_is_refused_with_its_angle() {
         let mut affine = Affine::scaling([1.0, 2.0, 3.0]);
         affine.matrix[0][1] = 2.0; // y leans by 45 degrees
-        match frame([2, 2, 2], affine) {
+        match frame(NIFTI, [2, 2, 2], affine) {
             Err(ReadReason::Sheared { first: 0, second: 1, degrees }) => {
                 assert!((degrees - 45.0).abs() < 1e-12);
             }
@@ -195,22 +275,22 @@ mod tests {
     #[test]
     fn degenerate_columns_are_refused() {
         for bad in [0.0, f64::NAN, f64::INFINITY, 1e300] {
-            let error = frame([2, 2, 2], Affine::scaling([1.0, bad, 1.0])).unwrap_err();
+            let error = frame(NIFTI, [2, 2, 2], Affine::scaling([1.0, bad, 1.0])).unwrap_err();
             assert!(error.to_string().contains("affine column y"), "{error}");
         }
         let mut affine = Affine::scaling([1.0; 3]);
         affine.origin[2] = f64::NAN;
-        assert!(frame([2, 2, 2], affine).is_err());
+        assert!(frame(NIFTI, [2, 2, 2], affine).is_err());
     }
 
     #[test]
     fn a_flat_image_stays_in_its_plane() {
         let mut affine = Affine::scaling([2.0, 3.0, 1.0]);
         affine.origin = [1.0, 2.0, 9.0];
-        let flat = flat_frame([4, 5], affine).unwrap();
+        let flat = flat_frame(NIFTI, [4, 5], affine).unwrap();
         assert_eq!((flat.spacing(), flat.origin()), ([2.0, 3.0], [1.0, 2.0]));
         affine.matrix[2][1] = 0.5;
-        assert!(flat_frame([4, 5], affine).unwrap_err().to_string().contains("row z"));
+        assert!(flat_frame(NIFTI, [4, 5], affine).unwrap_err().to_string().contains("row z"));
     }
 
     proptest! {
@@ -249,7 +329,7 @@ mod tests {
             affine.matrix = std::array::from_fn(|r| std::array::from_fn(|c| {
                 f64::from((turn[r][c] * spacing[c]) as f32)
             }));
-            let direction = frame([2, 2, 2], affine).unwrap().direction();
+            let direction = frame(NIFTI, [2, 2, 2], affine).unwrap().direction();
             for a in 0..3 {
                 for b in 0..3 {
                     let dot: f64 = (0..3).map(|r| direction[r][a] * direction[r][b]).sum();

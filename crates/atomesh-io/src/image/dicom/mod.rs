@@ -1,0 +1,187 @@
+//! DICOM: a folder with the slices of one series, or a single slice.
+//!
+//! Files are known by their magic word, whatever they are called; what is no image (reports, a
+//! `DICOMDIR`) is passed over. All images of a folder must be of one series, alike, and evenly spaced:
+//! what is mixed, missing or double is an error that names files and values. World coordinates are LPS
+//! in the files and are turned to RAS, as NIfTI's are. Samples are those that are stored, or, with a
+//! rescale slope and intercept (Hounsfield units), single precision; where the least value is white
+//! (MONOCHROME1) they are turned round first. A single slice is a flat image; its frame is kept if the
+//! slice lies across z, and is its spacing alone if not, since a plane has no other place for it.
+//!
+//! Plain samples are read, and those packed by run lengths. JPEG and its kin, frames in one file, and
+//! colours are refused by name. The grammar of a data set is short and written here by hand: the crate that
+//! has more of it brings some 50 others, an unmaintained one among them.
+
+use std::fs::{self, File};
+use std::io::{Read, Seek};
+use std::path::Path;
+
+use atomesh::image::Samples;
+use atomesh::watch::{Phase, Watch, check};
+
+use super::affine::{self, Affine, World};
+use super::watched::Watched;
+use super::{ImageFormat, LoadedImage, ReadReason};
+
+mod data_set;
+mod series;
+mod slice;
+
+use data_set::Reader;
+use series::Series;
+pub use series::SeriesError;
+use slice::{Pixels, Slice};
+
+const FORMAT: ImageFormat = ImageFormat::Dicom;
+
+/// Whether the file at a path begins as DICOM files do.
+pub(super) fn is_dicom(path: &Path) -> bool {
+    File::open(path).is_ok_and(|mut file| data_set::is_dicom(&mut file))
+}
+
+/// Reads a file with a single slice.
+pub(super) fn read<R: Read + Seek>(
+    source: Watched<R>,
+    file_bytes: u64,
+) -> Result<LoadedImage, ReadReason> {
+    let mut reader = Reader::new(source, file_bytes);
+    let slice = Slice::read(&mut reader)?.ok_or_else(|| ReadReason::Unsupported {
+        format: FORMAT,
+        found: "no image".into(),
+        expected: "a slice",
+    })?;
+    let shape = slice.pixels.shape;
+    let (affine, world) = flat_affine(&slice);
+    let image = affine::image(FORMAT, &shape, affine, || {
+        let mut volume = Volume::new(&slice.pixels, slice.is_plain(), shape[0] * shape[1])?;
+        volume.append(&slice.samples(&mut reader)?, slice.scale);
+        Ok(volume.samples)
+    })?;
+    Ok(LoadedImage::from(image).noting(world.note()))
+}
+
+/// Reads the slices in a folder.
+pub(super) fn read_folder(folder: &Path, watch: &mut dyn Watch) -> Result<LoadedImage, ReadReason> {
+    let mut names = Vec::new();
+    for entry in fs::read_dir(folder).map_err(ReadReason::Io)? {
+        let entry = entry.map_err(ReadReason::Io)?;
+        // links are followed
+        if entry.path().is_file() {
+            names.push(entry.file_name());
+        }
+    }
+    names.sort();
+    let (mut slices, mut others) = (Vec::new(), 0);
+    for (k, name) in names.iter().enumerate() {
+        // a header is some kilobytes, a slice half a megabyte
+        check(watch, Phase::Read, 0.1 * k as f64 / names.len() as f64, None)?;
+        let text = name.to_string_lossy().into_owned();
+        let slice = header(&folder.join(name)).map_err(|reason| in_file(&text, reason))?;
+        match slice {
+            Some(slice) => slices.push((text, slice)),
+            None => others += 1,
+        }
+    }
+    let series = Series::new(slices, others)?;
+    let slices = &series.slices;
+    let (_, head) = &slices[0];
+    let [nx, ny] = head.pixels.shape;
+    let samples = || {
+        let is_plain = slices.iter().all(|(_, slice)| slice.is_plain());
+        let mut volume = Volume::new(&head.pixels, is_plain, nx * ny * slices.len())?;
+        for (k, (file, slice)) in slices.iter().enumerate() {
+            check(watch, Phase::Read, 0.1 + 0.9 * k as f64 / slices.len() as f64, None)?;
+            let values = open(&folder.join(file)).and_then(|mut reader| slice.samples(&mut reader));
+            volume.append(&values.map_err(|reason| in_file(file, reason))?, slice.scale);
+        }
+        Ok(volume.samples)
+    };
+    let (image, world) = match slices.len() {
+        1 => {
+            let (affine, world) = flat_affine(head);
+            (affine::image(FORMAT, &[nx, ny], affine, samples)?, world)
+        }
+        nz => {
+            let affine = head.affine(series.step);
+            (affine::image(FORMAT, &[nx, ny, nz], affine, samples)?, World::LeftPosterior)
+        }
+    };
+    Ok(LoadedImage::from(image).noting(world.note()))
+}
+
+/// The error of a file in the folder.
+fn in_file(file: &str, reason: ReadReason) -> ReadReason {
+    match reason {
+        ReadReason::Cancelled(_) => reason,
+        _ => ReadReason::Slice { file: file.into(), reason: Box::new(reason) },
+    }
+}
+
+fn open(path: &Path) -> Result<Reader<File>, ReadReason> {
+    let file = File::open(path).map_err(ReadReason::Io)?;
+    let bytes = file.metadata().map_err(ReadReason::Io)?.len();
+    Ok(Reader::new(file, bytes))
+}
+
+/// The header of a slice; none if the file is no DICOM file, or holds no image.
+fn header(path: &Path) -> Result<Option<Slice>, ReadReason> {
+    if is_dicom(path) { Slice::read(&mut open(path)?) } else { Ok(None) }
+}
+
+/// The affine of a single slice, and the world it was stated in: where it is if it lies across z, else
+/// its spacing.
+fn flat_affine(slice: &Slice) -> (Affine, World) {
+    let affine = slice.affine([0.0, 0.0, 1.0]);
+    if affine::flat_frame(FORMAT, slice.pixels.shape, affine).is_ok() {
+        return (affine, World::LeftPosterior);
+    }
+    let [x, y] = slice.spacing.unwrap_or([1.0; 2]);
+    (Affine::scaling([x, y, 1.0]), World::Ours)
+}
+
+/// The samples of all slices.
+struct Volume {
+    samples: Samples,
+}
+
+impl Volume {
+    /// Room for `count` samples, in the least type that holds the stored ones, or in single precision
+    /// if they are rescaled.
+    fn new(pixels: &Pixels, is_plain: bool, count: usize) -> Result<Self, ReadReason> {
+        let samples = match (is_plain, pixels.bits.1, pixels.is_signed) {
+            (false, ..) => Samples::F32(room(count)?),
+            (_, ..9, false) => Samples::U8(room(count)?),
+            (_, ..9, true) => Samples::I8(room(count)?),
+            (_, ..17, false) => Samples::U16(room(count)?),
+            (_, ..17, true) => Samples::I16(room(count)?),
+            (_, _, false) => Samples::U32(room(count)?),
+            (_, _, true) => Samples::I32(room(count)?),
+        };
+        Ok(Self { samples })
+    }
+
+    /// Appends the samples of a slice.
+    fn append(&mut self, values: &[i64], (slope, intercept): (f64, f64)) {
+        /// Appends with one function for each type of integers.
+        macro_rules! append_as {
+            ($($kind:ident $number:ty),*) => {
+                match &mut self.samples {
+                    $(Samples::$kind(v) => v.extend(values.iter().map(|&x| x as $number)),)*
+                    Samples::F32(v) => {
+                        v.extend(values.iter().map(|&x| (x as f64 * slope + intercept) as f32));
+                    }
+                    _ => {} // no other is made
+                }
+            };
+        }
+        append_as!(U8 u8, I8 i8, U16 u16, I16 i16, U32 u32, I32 i32);
+    }
+}
+
+/// A vector with room for `count` samples.
+fn room<T>(count: usize) -> Result<Vec<T>, ReadReason> {
+    let mut samples = Vec::new();
+    let memory = |_| ReadReason::Memory { bytes: (count * size_of::<T>()) as u128 };
+    samples.try_reserve_exact(count).map_err(memory)?;
+    Ok(samples)
+}

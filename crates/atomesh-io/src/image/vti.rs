@@ -1,0 +1,209 @@
+//! VTI, VTK's XML format for images: text, base64 or raw data, inline or appended, plain or packed by
+//! zlib.
+//!
+//! World coordinates stand as they are in the file: VTK knows no body. One piece and one array of
+//! scalars is read: that which the file names as its scalars, else the first. Samples are the points; a
+//! file that has values in cells alone has its samples in their middles, so the origin moves by half a
+//! step. An image of a single layer in z is flat.
+//!
+//! Written is one array of points, `image`, appended as zlib blocks, as in VTU files.
+
+use std::io::{Read, Seek, Write};
+
+use atomesh::image::{Image, Samples};
+use atomesh::watch::Watch;
+
+use super::affine::{self, Affine};
+use super::stream::{self, GZIP_RATIO, Layout};
+use super::text::{TextSamples, numbers, shortened};
+use super::watched::Watched;
+use super::{ByteOrder, ImageFormat, LoadedImage, ReadNote, ReadReason, SampleType, WriteReason};
+use crate::mesh::MeshWriteError;
+use crate::mesh::column::{Column, Endian};
+use crate::mesh::vtu::appended::Head;
+use crate::mesh::vtu::array::{Array, Place};
+use crate::mesh::vtu::read::{Document, Piece};
+use crate::mesh::vtu::xml::Tag;
+
+const FORMAT: ImageFormat = ImageFormat::Vti;
+
+/// VTK's name of this kind of file.
+const KIND: &str = "ImageData";
+
+fn wrong(field: &'static str, value: &str, expected: &'static str) -> ReadReason {
+    affine::wrong(FORMAT, field, shortened(value), expected)
+}
+
+fn unsupported(found: String, expected: &'static str) -> ReadReason {
+    ReadReason::Unsupported { format: FORMAT, found, expected }
+}
+
+/// Reads a `.vti` file, which is held whole meanwhile.
+pub(super) fn read<R: Read>(
+    mut source: Watched<R>,
+    file_bytes: u64,
+) -> Result<LoadedImage, ReadReason> {
+    let mut bytes = Vec::new();
+    let room = usize::try_from(file_bytes).unwrap_or(usize::MAX);
+    let memory = |_| ReadReason::Memory { bytes: file_bytes.into() };
+    bytes.try_reserve_exact(room).map_err(memory)?;
+    source.read_to_end(&mut bytes).map_err(ReadReason::Io)?;
+    let decoder = |e| ReadReason::decoder(FORMAT, e);
+    let document = Document::parse(&bytes, KIND).map_err(decoder)?;
+    let [piece] = document.pieces.as_slice() else {
+        let found = format!("{} pieces", document.pieces.len());
+        return Err(unsupported(found, "one piece"));
+    };
+    let grid =
+        document.grid.as_ref().ok_or_else(|| wrong(KIND, "missing", "a tag of that name"))?;
+    let (first, mut shape) = extent(piece.extent)?;
+    let mut affine = affine_of(grid)?;
+    let (array, is_of_cells) = scalars(piece)?;
+    // sample 0 is where the extent begins
+    let mut start = first;
+    if is_of_cells {
+        for (count, start) in shape.iter_mut().zip(&mut start).filter(|(count, _)| **count > 1) {
+            *count -= 1;
+            *start += 0.5;
+        }
+    }
+    for r in 0..3 {
+        affine.origin[r] += (0..3).map(|c| affine.matrix[r][c] * start[c]).sum::<f64>();
+    }
+    let axes = if shape[2] == 1 { 2 } else { 3 };
+    let read = || samples(array, &shape, file_bytes);
+    let image = affine::image(FORMAT, &shape[..axes], affine, read)?;
+    Ok(LoadedImage::from(image).noting(is_of_cells.then_some(ReadNote::Cells)))
+}
+
+/// The first index along each axis, and the shape, of six numbers.
+fn extent(text: &str) -> Result<([f64; 3], [usize; 3]), ReadReason> {
+    let error = || wrong("Extent", text, "first and last index along x, y and z");
+    let ends: Vec<i64> = numbers(text).ok_or_else(error)?;
+    if ends.len() != 6 {
+        return Err(error());
+    }
+    let mut shape = [0; 3];
+    for axis in 0..3 {
+        let count = ends[2 * axis + 1].checked_sub(ends[2 * axis]).and_then(|n| n.checked_add(1));
+        shape[axis] = count.filter(|&n| n > 0).ok_or_else(error)? as usize;
+    }
+    Ok((std::array::from_fn(|axis| ends[2 * axis] as f64), shape))
+}
+
+/// Indices to world coordinates.
+fn affine_of(grid: &Tag) -> Result<Affine, ReadReason> {
+    let listed = |name: &'static str, count: usize, default: &[f64]| {
+        let Some(text) = grid.get(name) else { return Ok(default.to_vec()) };
+        let all = numbers::<f64>(text).filter(|all| all.len() == count);
+        all.ok_or_else(|| wrong(name, text, "3 numbers, 9 in a Direction"))
+    };
+    let origin = listed("Origin", 3, &[0.0; 3])?;
+    let spacing = listed("Spacing", 3, &[1.0; 3])?;
+    let direction = listed("Direction", 9, &[1.0, 0.0, 0.0, 0.0, 1.0, 0.0, 0.0, 0.0, 1.0])?;
+    Ok(Affine {
+        matrix: std::array::from_fn(|r| std::array::from_fn(|c| direction[3 * r + c] * spacing[c])),
+        origin: std::array::from_fn(|r| origin[r]),
+    })
+}
+
+/// The array that holds the image, and whether it is one of cells.
+fn scalars<'a, 'b>(piece: &'b Piece<'a>) -> Result<(&'b Array<'a>, bool), ReadReason> {
+    let is_of_cells = piece.point_data.is_empty();
+    let arrays = if is_of_cells { &piece.cell_data } else { &piece.point_data };
+    let named = piece.scalars[usize::from(is_of_cells)].filter(|name| !name.is_empty());
+    let named = named.and_then(|name| arrays.iter().find(|a| a.name == name));
+    let found = named.or_else(|| arrays.iter().find(|a| a.components == 1)).or(arrays.first());
+    match found {
+        Some(array) if array.components == 1 => Ok((array, is_of_cells)),
+        Some(Array { name, components, .. }) => {
+            let found = format!("an array {name:?} of {components} values a sample");
+            Err(unsupported(found, "one value a sample"))
+        }
+        None => Err(unsupported("no array of points or cells".into(), "one array of scalars")),
+    }
+}
+
+/// The samples of an array.
+fn samples(array: &Array, shape: &[usize; 3], file_bytes: u64) -> Result<Samples, ReadReason> {
+    let sample_type = match array.kind {
+        "Int8" => SampleType::I8,
+        "UInt8" => SampleType::U8,
+        "Int16" => SampleType::I16,
+        "UInt16" => SampleType::U16,
+        "Int32" => SampleType::I32,
+        "UInt32" => SampleType::U32,
+        "Int64" => SampleType::I64,
+        "UInt64" => SampleType::U64,
+        "Float32" => SampleType::F32,
+        "Float64" => SampleType::F64,
+        other => return Err(unsupported(format!("samples of type {other}"), "Int8 ... Float64")),
+    };
+    let count = super::plausible_count(shape, file_bytes, GZIP_RATIO)?;
+    let is_big = array.layout.endian == Endian::Big && !matches!(array.place, Place::Text(_));
+    let byte_order = if is_big { ByteOrder::Big } else { ByteOrder::Little };
+    let layout =
+        Layout { sample_type, byte_order, count, reserve: count, scale: None, turned: None };
+    if let Place::Text(at) = array.place {
+        let count = super::plausible_count(shape, file_bytes, 1)?;
+        let mut words = TextSamples::new(array.text(at).as_bytes(), sample_type);
+        return stream::read_samples(&mut words, &Layout { count, ..layout });
+    }
+    let bytes = array.bytes(count.checked_mul(sample_type.size()));
+    let bytes = bytes.map_err(|e| ReadReason::decoder(FORMAT, e))?;
+    stream::read_samples(&mut &bytes[..], &layout)
+}
+
+/// Writes a `.vti` file; numbers have all their digits, so that the frame is kept exactly.
+pub(super) fn write<const D: usize>(
+    out: &mut (impl Write + Seek),
+    image: &Image<D>,
+    watch: &mut dyn Watch,
+) -> Result<(), WriteReason> {
+    let frame = image.frame();
+    let listed = |numbers: &[f64]| numbers.iter().map(f64::to_string).collect::<Vec<_>>().join(" ");
+    let (mut origin, mut spacing) = ([0.0; 3], [1.0; 3]);
+    let mut direction = Affine::scaling([1.0; 3]).matrix;
+    origin[..D].copy_from_slice(&frame.origin());
+    spacing[..D].copy_from_slice(&frame.spacing());
+    for (row, of_frame) in direction.iter_mut().zip(frame.direction()) {
+        row[..D].copy_from_slice(&of_frame);
+    }
+    let last = |axis: usize| frame.shape().get(axis).map_or(0, |n| n - 1);
+    let extent = format!("0 {} 0 {} 0 {}", last(0), last(1), last(2));
+    let mut head = Head::with_attributes(
+        KIND,
+        &format!(
+            "WholeExtent=\"{extent}\" Origin=\"{}\" Spacing=\"{}\" Direction=\"{}\"",
+            listed(&origin),
+            listed(&spacing),
+            listed(direction.as_flattened())
+        ),
+    );
+    head.text(&format!("<Piece Extent=\"{extent}\">\n<PointData Scalars=\"image\">\n"));
+    /// Names the array with one function for each type.
+    macro_rules! name_as {
+        ($($kind:ident $name:literal),*) => {
+            match image.samples() {
+                $(Samples::$kind(v) => {
+                    head.array($name, "image", "", Column::slice(v, Endian::Little));
+                })*
+                other => {
+                    return Err(WriteReason::SampleType {
+                        format: FORMAT,
+                        sample_type: other.type_name(),
+                        expected: "integers up to 32 bits, float32 and float64",
+                    });
+                }
+            }
+        };
+    }
+    name_as!(U8 "UInt8", I8 "Int8", U16 "UInt16", I16 "Int16", U32 "UInt32", I32 "Int32",
+        F32 "Float32", F64 "Float64");
+    head.text("</PointData>\n</Piece>\n");
+    head.write(out, watch).map_err(|e| match e {
+        MeshWriteError::Io(e) => WriteReason::Io(e),
+        MeshWriteError::Cancelled(e) => WriteReason::Cancelled(e),
+        other => WriteReason::Encoder { format: FORMAT, error: other.into() },
+    })
+}
