@@ -29,7 +29,8 @@ pub struct EnhanceArgs {
     /// Image to enhance: every format that `mesh` reads
     #[arg(value_name = "IMAGE")]
     image: PathBuf,
-    /// Potential to write, float32 with the image's frame: .npy (without frame), .nii, .nii.gz, .tif or .raw
+    /// Potential to write, float32: .nii, .nii.gz, .nrrd and .vti with the image's frame; .npy, .tif and
+    /// .raw without
     #[arg(short, long, value_name = "FILE")]
     output: PathBuf,
     /// Picture of the potential, features dark, .png or .svg; in 3-D the three slices through the middle
