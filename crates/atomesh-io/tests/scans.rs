@@ -213,7 +213,7 @@ fn series_error(change: impl Fn(usize, &mut Slice)) -> (SeriesError, String) {
     let error = read(series(change).path()).unwrap_err();
     let text = error.to_string();
     match error.reason {
-        ReadReason::Series(reason) => (reason, text),
+        ReadReason::Series(reason) => (*reason, text),
         other => panic!("{other}"),
     }
 }

@@ -48,7 +48,7 @@ impl Affine {
     }
 
     /// The same samples in our world. LPS is RAS turned by half about z, so that nothing is mirrored.
-    pub fn from_world(mut self, world: World) -> Self {
+    pub fn turned_from(mut self, world: World) -> Self {
         let turned = match world {
             World::Ours => 0,
             World::LeftPosterior => 2,

@@ -157,7 +157,7 @@ pub enum ReadReason {
     },
     /// The files of a folder are not one volume.
     #[error(transparent)]
-    Series(#[from] SeriesError),
+    Series(Box<SeriesError>),
     /// A file of a folder cannot be read.
     #[error("{file}: {reason}")]
     Slice {
@@ -212,6 +212,12 @@ pub enum ReadReason {
         /// What the decoder said.
         error: Box<dyn Error + Send + Sync>,
     },
+}
+
+impl From<SeriesError> for ReadReason {
+    fn from(error: SeriesError) -> Self {
+        Self::Series(Box::new(error))
+    }
 }
 
 impl ReadReason {

@@ -226,6 +226,6 @@ impl Entries {
                 affine.matrix[r][c] = direction * spacing.as_ref().map_or(1.0, |s| s[c]);
             }
         }
-        Ok(affine.from_world(self.world()))
+        Ok(affine.turned_from(self.world()))
     }
 }

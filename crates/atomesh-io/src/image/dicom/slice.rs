@@ -91,7 +91,7 @@ impl Slice {
         let [x, y] = self.axes.unwrap_or([[1.0, 0.0, 0.0], [0.0, 1.0, 0.0]]);
         let matrix = std::array::from_fn(|r| [x[r] * spacing[0], y[r] * spacing[1], step[r]]);
         let affine = Affine { matrix, origin: self.position.unwrap_or_default() };
-        affine.from_world(World::LeftPosterior)
+        affine.turned_from(World::LeftPosterior)
     }
 
     /// Checks that a file of `file_bytes` bytes can hold the samples.

@@ -311,7 +311,7 @@ impl Fields {
                 affine.origin[c] = value + if is_cell { affine.matrix[c][c] / 2.0 } else { 0.0 };
             }
         }
-        Ok(affine.from_world(world))
+        Ok(affine.turned_from(world))
     }
 
     /// The numbers of a field that has one for each dimension, of the given axes.
