@@ -71,6 +71,12 @@ section! {
         #[arg(long, value_name = "SIGMA",
             value_parser = number_in(0.3, 1000.0, "a number of samples from 0.3 to 1000"))]
         pub edge_scale: f64,
+        /// Take noise off the image before features are looked for, and keep its edges (non-local means). SHARE is how
+        /// much patches of the image may differ, over the noise, and still be averaged; 0.4 if left out. Default: off
+        #[arg(long, value_name = "SHARE", num_args = 0..=1, require_equals = true,
+            default_missing_value = "0.4",
+            value_parser = number_in(0.01, 10.0, "a number from 0.01 to 10"))]
+        pub denoise: f64,
         /// Which ridges and horizons: bright ones (peaks), dark ones (troughs), or both. Default: bright
         #[arg(long, value_name = "WHICH",
             value_parser = named::<Polarity>(&["bright", "dark", "both"]))]
@@ -135,6 +141,7 @@ impl PotentialOptions {
             edge_operator: self.edge_operator.unwrap_or(basis.edge_operator),
             edge_scale: self.edge_scale.unwrap_or(basis.edge_scale),
             smooth: self.smooth.or(basis.smooth),
+            denoise: self.denoise.or(basis.denoise),
             repel: self.repel.unwrap_or(basis.repel),
             ridges: RidgeOptions {
                 polarity: self.polarity.unwrap_or(basis.ridges.polarity),

@@ -108,6 +108,7 @@ fn enhance<const D: usize>(
             EnhanceError::Cancelled(_) => Failure::cancelled(),
             EnhanceError::EdgeScale { .. }
             | EnhanceError::Smooth { .. }
+            | EnhanceError::Denoise(_)
             | EnhanceError::Option { .. } => Failure::misuse(e),
             _ => Failure::content(e).about(&args.image),
         })?;

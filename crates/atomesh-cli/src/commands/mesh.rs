@@ -416,6 +416,7 @@ impl Job<'_> {
             | PipelineError::Enhance(
                 EnhanceError::EdgeScale { .. }
                 | EnhanceError::Smooth { .. }
+                | EnhanceError::Denoise(_)
                 | EnhanceError::Option { .. },
             )
             | PipelineError::Lattice(LatticeError::SpacingFactor { .. })

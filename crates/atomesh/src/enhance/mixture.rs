@@ -3,7 +3,7 @@
 use std::fmt;
 use std::str::FromStr;
 
-use super::{EnhanceError, Enhanced, FeatureOptions, Features, enhance};
+use super::{EnhanceError, Enhanced, FeatureOptions, Features, denoised, enhance};
 use crate::image::Image;
 use crate::watch::Watch;
 
@@ -119,7 +119,7 @@ impl fmt::Display for Mixture {
 }
 
 /// Makes one potential of several kinds of features: wherever the deepest valley is, its depth times the weight of
-/// its kind counts. `image_of` gives the image of each kind; all must have the same shape.
+/// its kind counts. `image_of` gives the image of each kind: one for labels, one for all others, of the same shape.
 ///
 /// Where features of two kinds meet, the potential is that of the stronger, not the sum, so that it stays within
 /// −1…0 (0…1 if it repels) and crossings do not gather atoms.
@@ -133,9 +133,17 @@ pub fn enhance_mixture<'a, const D: usize>(
     watch: &mut dyn Watch,
 ) -> Result<Enhanced, EnhanceError> {
     let mut all: Option<Enhanced> = None;
+    // without its noise, once for all kinds but labels
+    let mut clean: Option<Image<D>> = None;
     for Share { features, weight } in &mixture.0 {
-        let options = FeatureOptions { features: *features, ..*options };
-        let mut one = enhance(image_of(*features), &options, watch)?;
+        let mut options = FeatureOptions { features: *features, ..*options };
+        let image = image_of(*features);
+        if clean.is_none() {
+            clean = denoised(image, &options, watch)?;
+        }
+        options.denoise = None;
+        let image = clean.as_ref().filter(|_| *features != Features::Labels).unwrap_or(image);
+        let mut one = enhance(image, &options, watch)?;
         let weight = *weight as f32;
         one.values.iter_mut().for_each(|b| *b *= weight);
         all = Some(match all {

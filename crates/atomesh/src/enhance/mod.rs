@@ -176,6 +176,10 @@ pub struct FeatureOptions {
     pub horizons: HorizonOptions,
     /// How edges are found by [`EdgeOperator::Crest`].
     pub crests: EdgeCrestOptions,
+    /// Takes noise off the image first and keeps its edges ([`denoise`], its other options by default): h / σ, how much
+    /// patches of the image may differ in standard deviations of the noise and still be averaged. Labels are names, and
+    /// stay as they are. Default: the image is taken as it is.
+    pub denoise: Option<f64>,
     /// Negates b, so that atoms keep off features and line up alongside them. Default false.
     pub repel: bool,
     /// The lattice units of `smooth` and of gradients. Default: physical.
@@ -193,6 +197,7 @@ impl Default for FeatureOptions {
             faults: FaultOptions::default(),
             horizons: HorizonOptions::default(),
             crests: EdgeCrestOptions::default(),
+            denoise: None,
             repel: false,
             units: Units::default(),
         }
@@ -272,6 +277,9 @@ pub enum EnhanceError {
         /// How many different samples there are.
         count: usize,
     },
+    /// Why the image was not denoised.
+    #[error(transparent)]
+    Denoise(DenoiseError),
     /// An option of how crests are found is out of its range.
     #[error("{option} of {kind} is {value}; expected {least} to {most}")]
     Option {
@@ -289,6 +297,15 @@ pub enum EnhanceError {
     /// The watch ended the work.
     #[error(transparent)]
     Cancelled(#[from] Cancelled),
+}
+
+impl From<DenoiseError> for EnhanceError {
+    fn from(error: DenoiseError) -> Self {
+        match error {
+            DenoiseError::Cancelled(cancelled) => Self::Cancelled(cancelled),
+            other => Self::Denoise(other),
+        }
+    }
 }
 
 /// A potential made from an image.
@@ -327,6 +344,9 @@ pub fn enhance<const D: usize>(
 ) -> Result<Enhanced, EnhanceError> {
     check_options(options)?;
     check(watch, Phase::Potential, 0.0, None)?;
+    if let Some(image) = denoised(image, options, watch)? {
+        return enhance(&image, &FeatureOptions { denoise: None, ..*options }, watch);
+    }
     let unit = UnitSamples::new(image.samples())?;
     check(watch, Phase::Potential, 0.1, None)?;
     let zeros = || vec![0.0; unit.len()];
@@ -367,6 +387,25 @@ pub fn enhance<const D: usize>(
     }
     check(watch, Phase::Potential, 1.0, None)?;
     Ok(Enhanced { values, constant })
+}
+
+/// The image without its noise; `None` if that is not asked for.
+fn denoised<const D: usize>(
+    image: &Image<D>,
+    options: &FeatureOptions,
+    watch: &mut dyn Watch,
+) -> Result<Option<Image<D>>, EnhanceError> {
+    let Some(strength) = options.denoise else { return Ok(None) };
+    if matches!(options.features, Features::Labels | Features::None) {
+        return Ok(None);
+    }
+    UnitSamples::new(image.samples())?; // refuses what is not finite
+    let denoising = DenoiseOptions { strength, ..DenoiseOptions::for_dimension(D) };
+    let grid = image.frame().grid(options.units);
+    let values = image.samples().to_f32();
+    let clean = denoise(&values, &grid, &denoising, watch)?;
+    let clean = Image::new(*image.frame(), Samples::F32(clean));
+    Ok(Some(clean.expect("there is a value for each sample of the image")))
 }
 
 /// The potential of features that are thinned to crests: valleys of one depth and width.
