@@ -212,19 +212,14 @@ impl Outputs {
             &input.labels,
         ];
         let inputs = inputs.into_iter().flatten().map(PathBuf::as_path);
-        let mut taken: Vec<PathBuf> = inputs.filter_map(|p| p.canonicalize().ok()).collect();
+        let mut places = Places::taken(inputs);
         for path in self.paths().chain(config) {
             if path == self.mesh {
                 self.mesh_format.check_writable(path).map_err(|e| cannot_write(path, &e))?;
             } else {
                 check_writable(path)?;
             }
-            let name = absolute(path);
-            if taken.contains(&name) {
-                let message = "would be written over another file of this run";
-                return Err(Failure::misuse(message).about(path));
-            }
-            taken.push(name);
+            places.take(path)?;
         }
         Ok(())
     }
@@ -392,6 +387,30 @@ pub fn check_potential(path: &Path) -> Result<(), Failure> {
     match ImageFormat::from_path(path) {
         Some(Npy | Nifti | NiftiGz | Nrrd | Vti | Tiff | Raw) => Ok(()),
         _ => Err(unknown_ending(path, ".npy, .nii, .nii.gz, .nrrd, .vti, .tif, .raw")),
+    }
+}
+
+/// Places of files that a run must not write over.
+pub struct Places(Vec<PathBuf>);
+
+impl Places {
+    /// The places of the files that are read.
+    pub fn taken<'a>(inputs: impl IntoIterator<Item = &'a Path>) -> Self {
+        Self(inputs.into_iter().filter_map(|path| path.canonicalize().ok()).collect())
+    }
+
+    /// Takes the place of a file that is written.
+    ///
+    /// # Errors
+    /// [`Failure`] if it is taken.
+    pub fn take(&mut self, path: &Path) -> Result<(), Failure> {
+        let name = absolute(path);
+        if self.0.contains(&name) {
+            let message = "would be written over another file of this run";
+            return Err(Failure::misuse(message).about(path));
+        }
+        self.0.push(name);
+        Ok(())
     }
 }
 

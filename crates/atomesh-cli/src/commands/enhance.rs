@@ -13,7 +13,7 @@ use crate::dimension::Dimension;
 use crate::failure::Failure;
 use crate::frame_options::{self, FrameOptions};
 use crate::memory;
-use crate::outputs::{check_potential, check_writable, unknown_ending, write_bytes};
+use crate::outputs::{Places, check_potential, check_writable, unknown_ending, write_bytes};
 use crate::progress::{Progress, writing};
 use crate::run_config::PotentialOptions;
 use crate::values::named;
@@ -70,9 +70,12 @@ pub fn run(args: &EnhanceArgs, watch: &mut Progress) -> Result<String, Failure> 
     };
     {
         let _guard = writing();
-        check_writable(&args.output)?;
-        if let Some((path, _)) = picture {
+        let mut places = Places::taken([args.image.as_path()]);
+        for path in
+            [Some(args.output.as_path()), picture.map(|(path, _)| path)].into_iter().flatten()
+        {
             check_writable(path)?;
+            places.take(path)?;
         }
     }
     match frame_options::read(&args.image, &args.frame.read_options()?, watch)? {

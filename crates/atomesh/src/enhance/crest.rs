@@ -2,7 +2,7 @@
 //!
 //! Whatever finds features gives their crests, sample by sample but with places between the samples.
 //! Here they are cleaned ([`connected`]) and turned into a potential whose valleys have one depth and
-//! width, whatever the features' own strength, width and slant are ([`widen`]), as METHOD asks.
+//! width, whatever the features' own strength, width and slant are ([`widen`]).
 //! Source: Hale (2002) thins to whole samples and smooths these; that leaves valleys deeper along the axes
 //! than aslant. Distances to crests between samples do not.
 
