@@ -4,6 +4,7 @@ use atomesh::enhance::{DenoiseOptions, FeatureOptions, Features, denoise, enhanc
 use atomesh::image::{
     Frame, Grid, Image, Samples, StructureTensor, gaussian, gradient_magnitude, prewitt_magnitude,
 };
+use atomesh::synth::{Scene, SynthOptions, synthesize};
 use atomesh::watch::Silent;
 use criterion::{Criterion, Throughput, criterion_group, criterion_main};
 
@@ -61,6 +62,17 @@ fn image_work(criterion: &mut Criterion) {
     group.bench_function("enhance_dark_f32", |b| {
         b.iter(|| enhance(&image, &options, &mut Silent));
     });
+
+    // amplitudes: what the search for lines and sheets is for
+    let side = SIDE / 2;
+    group.throughput(Throughput::Elements((side * side * side) as u64));
+    let drawing = SynthOptions { noise: 0.1, ..SynthOptions::new([side; 3]) };
+    let Ok(drawn) = synthesize(Scene::Layers, &drawing) else { return };
+    let kinds = [Features::Ridges, Features::Horizons, Features::Faults];
+    for (features, name) in kinds.into_iter().zip(["ridges", "horizons", "faults"]) {
+        let options = FeatureOptions { features, ..Default::default() };
+        group.bench_function(name, |b| b.iter(|| enhance(&drawn.image, &options, &mut Silent)));
+    }
     group.finish();
 }
 
