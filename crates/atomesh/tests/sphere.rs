@@ -25,8 +25,8 @@ fn share(mesh: &Mesh<3>, center: &[f64; 3], radius: f64) -> f64 {
     volume / (4.0 / 3.0 * std::f64::consts::PI * radius.powi(3))
 }
 
-/// How far the corners of the facets between cells inside and outside are from the sphere at most.
-fn farthest(mesh: &Mesh<3>, center: &[f64; 3], radius: f64) -> f64 {
+/// The share of the facets between cells inside and outside that have a corner more than a sample off the sphere.
+fn share_off(mesh: &Mesh<3>, center: &[f64; 3], radius: f64) -> f64 {
     let mut facets: Vec<([u32; 3], bool)> = Vec::new();
     for (corners, inside) in mesh.cells().zip(inside(mesh, center, radius)) {
         for k in 0..4 {
@@ -36,10 +36,10 @@ fn farthest(mesh: &Mesh<3>, center: &[f64; 3], radius: f64) -> f64 {
         }
     }
     facets.sort_unstable();
-    let between = facets.windows(2).filter(|w| w[0].0 == w[1].0 && w[0].1 != w[1].1);
-    let corners = between.flat_map(|w| w[0].0);
     let off = |c: u32| (distance_squared(&mesh.points()[c as usize], center).sqrt() - radius).abs();
-    corners.map(off).fold(0.0, f64::max)
+    let between = facets.windows(2).filter(|w| w[0].0 == w[1].0 && w[0].1 != w[1].1);
+    let are_off: Vec<bool> = between.map(|w| w[0].0.into_iter().any(|c| off(c) > 1.0)).collect();
+    are_off.iter().filter(|off| **off).count() as f64 / are_off.len() as f64
 }
 
 #[test]
@@ -66,9 +66,9 @@ fn a_sphere_is_far_nearer_to_the_truth_than_with_corners_on_it() {
     let error = (share(full.mesh(), &center, radius) - 1.0).abs();
     assert!(error < 0.5 * chord, "{error} {chord}");
     let off = meshed(Align::Off);
-    // a point beside the valley's bottom, whose cells pass for either side, is 1 to 3 samples off
-    let [far, near] = [&off, &full].map(|o| farthest(o.mesh(), &center, radius));
-    assert!(near < 1.0 && far > 1.5, "{near} {far}");
+    // a blurred surface is drawn inward by its curvature, here by a tenth of a sample, which leaves the rest to the mesh
+    let [far, near] = [&off, &full].map(|o| share_off(o.mesh(), &center, radius));
+    assert!(near < 0.5 * far, "{near} {far}");
     assert!(off.improve_report().is_none() && off.mesh() != full.mesh());
     let report = full.improve_report().unwrap();
     assert!(report.floor_held && report.angle_after >= 15.0, "{report:?}");

@@ -78,10 +78,14 @@ proptest! {
         let options = ImproveOptions { align, min_angle };
         let (better, report) = improve(mesh.clone(), &potential(sheet), 0.4, &options).unwrap();
         prop_assert_eq!(better.validate(), Ok(()));
-        prop_assert_eq!(better.points().len(), mesh.points().len());
+        // strays may be merged, but not those on a side
+        let on_sides = |mesh: &Mesh<3>| mesh.points().iter().filter(|p| sides(p) != 0).count();
+        prop_assert_eq!(on_sides(&better), on_sides(&mesh));
+        let is_whole = better.points().len() == mesh.points().len();
+        prop_assert!(is_whole || align == Align::Full && better.points().len() < mesh.points().len());
         // some thousand roundings of volumes that sum to the box's
         prop_assert!((better.measure() - SIDE.powi(3)).abs() < 1e-12 * SIDE.powi(3));
-        for (p, q) in mesh.points().iter().zip(better.points()) {
+        for (p, q) in mesh.points().iter().zip(better.points()).filter(|_| is_whole) {
             prop_assert_eq!(sides(p) & !sides(q), 0, "{:?} left a side for {:?}", p, q);
             prop_assert!(align == Align::Full || p == q);
         }
