@@ -14,7 +14,7 @@
 use crate::geometry::Sets;
 use crate::geometry::linear::{Matrix, largest_eigenpair};
 use crate::geometry::{Point, dot};
-use crate::image::gaussian_derivative_into;
+use crate::image::{coordinates, gaussian_derivative_into, neighbour};
 use crate::watch::{Cancelled, Phase, Watch, check};
 use rayon::prelude::*;
 
@@ -145,15 +145,6 @@ impl<const D: usize> Slopes<D> {
     }
 }
 
-/// The sample at an index, axis by axis.
-fn coordinates<const D: usize>(mut index: usize, shape: [usize; D]) -> [usize; D] {
-    std::array::from_fn(|k| {
-        let i = index % shape[k];
-        index /= shape[k];
-        i
-    })
-}
-
 /// For each bottom whether its group has at least `least`.
 fn are_in_large_groups<const D: usize>(
     bottoms: &[Bottom<D>],
@@ -180,23 +171,6 @@ fn are_in_large_groups<const D: usize>(
     let roots = groups.roots();
     roots.iter().for_each(|&root| sizes[root as usize] += 1);
     roots.iter().map(|&root| f64::from(sizes[root as usize]) >= least).collect()
-}
-
-/// The index of the neighbour `code`, whose digits to base 3 are the steps along the axes plus 1;
-/// `None` outside the image.
-fn neighbour<const D: usize>(
-    sample: [usize; D],
-    shape: [usize; D],
-    mut code: usize,
-) -> Option<usize> {
-    let (mut index, mut stride) = (0, 1);
-    for k in 0..D {
-        let i = (sample[k] + code % 3).checked_sub(1).filter(|&i| i < shape[k])?;
-        index += i * stride;
-        stride *= shape[k];
-        code /= 3;
-    }
-    Some(index)
 }
 
 #[cfg(test)]

@@ -7,7 +7,7 @@
 //! than aslant. Distances to crests between samples do not.
 
 use crate::geometry::Sets;
-use crate::image::Grid;
+use crate::image::{Grid, coordinates, neighbour};
 use rayon::prelude::*;
 use std::ops::Range;
 
@@ -78,7 +78,7 @@ fn groups<const D: usize>(crests: &[Crest<D>], shape: [usize; D]) -> Vec<u32> {
         }
         let sample = coordinates(crest.index, shape);
         for (code, place) in places.iter_mut().enumerate() {
-            let Some(index) = earlier_neighbour(sample, shape, code) else { continue };
+            let Some(index) = neighbour(sample, shape, code) else { continue };
             while crests[*place].index < index {
                 *place += 1; // ends at the crest itself at the latest
             }
@@ -88,32 +88,6 @@ fn groups<const D: usize>(crests: &[Crest<D>], shape: [usize; D]) -> Vec<u32> {
         }
     }
     groups.roots()
-}
-
-/// The sample at an index, axis by axis.
-pub(crate) fn coordinates<const D: usize>(mut index: usize, shape: [usize; D]) -> [usize; D] {
-    std::array::from_fn(|k| {
-        let i = index % shape[k];
-        index /= shape[k];
-        i
-    })
-}
-
-/// The index of the neighbour `code`, whose digits to base 3 are the steps along the axes plus 1; the
-/// first half of all codes are earlier in memory. `None` outside the image.
-fn earlier_neighbour<const D: usize>(
-    sample: [usize; D],
-    shape: [usize; D],
-    mut code: usize,
-) -> Option<usize> {
-    let (mut index, mut stride) = (0, 1);
-    for k in 0..D {
-        let i = (sample[k] + code % 3).checked_sub(1).filter(|&i| i < shape[k])?;
-        index += i * stride;
-        stride *= shape[k];
-        code /= 3;
-    }
-    Some(index)
 }
 
 /// b(x): −1 on crests, of one depth and width: −exp(−s²/2σ²), s the distance to the nearest crest's line or sheet.

@@ -9,7 +9,7 @@
 
 use super::crest::Crest;
 use super::quantile::{Order, Ranks};
-use crate::image::{Grid, Run, Stencil, Stream};
+use crate::image::{Grid, Run, Stencil, Stream, coordinates};
 use crate::watch::{Cancelled, Phase, Watch, check};
 use rayon::prelude::*;
 use serde::{Deserialize, Serialize};
@@ -186,7 +186,7 @@ impl<const D: usize> Window<D> {
         let size: usize = self.grid.shape[..D - 1].iter().product();
         let mut crests = std::mem::take(&mut self.crests);
         for start in (0..size).step_by(n) {
-            let mut sample = super::crest::coordinates(start, self.grid.shape);
+            let mut sample = coordinates(start, self.grid.shape);
             sample[D - 1] = plane;
             let row = Row {
                 sample,

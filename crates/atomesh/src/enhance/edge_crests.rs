@@ -12,7 +12,7 @@ use super::crossings::{Row, Unit, crossings, scale_strengths};
 use super::quantile::{Order, Ranks};
 use super::ridges::least_count;
 use super::{EnhanceError, LEAST_EDGE_SCALE, LONGEST, MOST_EXTENT, within};
-use crate::image::Grid;
+use crate::image::{Grid, coordinates};
 use crate::watch::{Phase, Watch, check};
 use serde::{Deserialize, Serialize};
 
@@ -146,7 +146,7 @@ fn detail<const D: usize>(unit: &Unit, shape: [usize; D], start: usize, out: &mu
         out.iter_mut().zip(&neighbours).for_each(|(sum, v)| *sum += sign * v);
     }
     for (i, out) in out.iter_mut().enumerate() {
-        let sample = super::crest::coordinates(start + i, shape);
+        let sample = coordinates(start + i, shape);
         let inside = (0..D).all(|k| sample[k] + 1 < shape[k] || shape[k] == 1);
         *out = if inside { (*out * scale).abs() } else { 0.0 };
     }
@@ -176,8 +176,8 @@ fn clear_scale<const D: usize>(noise: f64, contrast: f64) -> f64 {
 
 #[cfg(test)]
 mod tests {
-    use super::super::crest::coordinates;
     use super::*;
+    use crate::image::coordinates;
     use crate::watch::Silent;
     use rand::{RngExt, SeedableRng};
 

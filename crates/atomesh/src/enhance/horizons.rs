@@ -143,8 +143,8 @@ pub(crate) fn horizons<const D: usize>(
 
 #[cfg(test)]
 mod tests {
-    use super::super::crest::coordinates;
     use super::*;
+    use crate::image::coordinates;
     use crate::watch::Silent;
 
     /// Layers of 8 samples' thickness across a normal, as loud as `loudness` says of the last axis' share.

@@ -133,8 +133,8 @@ fn across<const D: usize>(hessian: [[f64; D]; D]) -> [f32; D] {
 
 #[cfg(test)]
 mod tests {
-    use super::super::crest::coordinates;
     use super::*;
+    use crate::image::coordinates;
     use crate::watch::Silent;
     use proptest::prelude::*;
 

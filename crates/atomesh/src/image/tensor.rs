@@ -257,17 +257,9 @@ fn unit_scale(values: &[f32]) -> f32 {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::image::{gaussian, gaussian_derivative};
+    use crate::image::{coordinates, gaussian, gaussian_derivative};
     use crate::watch::Silent;
     use rand::{RngExt, SeedableRng};
-
-    fn coordinates<const D: usize>(mut index: usize, shape: [usize; D]) -> [usize; D] {
-        std::array::from_fn(|k| {
-            let i = index % shape[k];
-            index /= shape[k];
-            i
-        })
-    }
 
     /// A plane wave along `direction`, in lattice units, one period every `length` of them.
     fn wave<const D: usize>(grid: &Grid<D>, direction: [f64; D], length: f64) -> Vec<f32> {

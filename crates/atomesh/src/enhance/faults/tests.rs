@@ -2,7 +2,7 @@
 
 use super::judge::{Score, deviation, score};
 use super::*;
-use crate::enhance::crest::coordinates;
+use crate::image::coordinates;
 use crate::synth::Scene;
 use crate::watch::{Cancelled, Silent};
 use proptest::prelude::*;
