@@ -15,6 +15,8 @@ use crate::geometry::{Point, distance_squared, dot};
 
 /// A valley that is worth the effort is as deep as this.
 const LEAST_DEPTH: f64 = 0.5;
+/// A point no deeper than this is far from every valley.
+const FAINT: f64 = 0.1;
 /// Of the greatest depth around, the point's own is at most this.
 const BESIDE: f64 = 0.88;
 /// Of so many of its neighbours, and of the bottom beside it, the depth is at least this share of the greatest.
@@ -60,7 +62,8 @@ impl Aligner<'_> {
     pub fn gather_strays(&mut self, patch: &mut Patch, open: &[bool], effort: &mut Effort) {
         let (mut star, mut around) = (Vec::new(), Vec::new());
         for point in 0..patch.points.len() as u32 {
-            if patch.freedom[point as usize] != 7 || !open[point as usize] {
+            let is_free = patch.freedom[point as usize] == 7 && open[point as usize];
+            if !is_free || self.depths[point as usize] < FAINT {
                 continue;
             }
             let Some((bottom, size)) = self.bottom(patch, point, &mut star, &mut around) else {
