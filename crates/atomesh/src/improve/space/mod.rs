@@ -4,7 +4,8 @@
 //!
 //! 1. cells below the floor are swapped away, or their points moved ([`heal`]);
 //! 2. swaps, then moves, bring facets onto valleys of b, and keep cells above the floor ([`align`]);
-//! 3. cells that are still below it are tried again.
+//! 3. cells that are still below it are tried again;
+//! 4. points that are left beside a valley get another try, on a copy of what is around them ([`stray`]).
 //!
 //! Parts are worked on side by side; what lies between two parts is done in a second and a third pass, which cut
 //! elsewhere ([`parts`]). No cell is ever inverted, points on a side of the box stay on it, and cells on the hull are
@@ -151,8 +152,7 @@ impl Work<'_> {
         }
         heal(patch, self.floor, ROUNDS, &mut effort);
         if self.align == Align::Full {
-            aligner.depths = patch.points.iter().map(|p| valley.depth(p)).collect();
-            aligner.gather_strays(patch, &open, &mut effort);
+            aligner.gather_strays(patch, &open, self.fields.distance, &mut effort);
         }
         effort
     }

@@ -13,10 +13,11 @@ use super::heal::{Effort, heal};
 use super::patch::{NONE, Patch};
 use super::smooth::{facing, worst_cosine};
 use super::valley::Contrast;
-use crate::geometry::{Point, distance_squared, dot};
+use crate::distance::NominalDistance;
+use crate::geometry::{Point, distance_squared};
 
 /// A valley that is worth the effort is as deep as this.
-const LEAST_DEPTH: f64 = 0.5;
+const LEAST_DEPTH: f64 = 0.6;
 /// A point no deeper than this is far from every valley.
 const FAINT: f64 = 0.1;
 /// Of the greatest depth around, the point's own is at most this.
@@ -24,9 +25,9 @@ const BESIDE: f64 = 0.88;
 /// Of so many of its neighbours, and of the bottom beside it, the depth is at least this share of the greatest.
 const SHALLOW: f64 = 0.75;
 const DEEP_NEIGHBOURS: usize = 4;
-/// How far the point is from the bottom at least, and at most, in the length of its edges.
+/// How far the point is from the bottom at least, in the length of its edges, and at most, in the nominal distance.
 const STRAY: f64 = 0.08;
-const REACH: f64 = 0.5;
+const REACH: f64 = 0.6;
 /// A point in the valley is crowded by one within this share of the length of its edges.
 const CROWDED: f64 = 0.7;
 /// The greatest cosine on the way, that of 2°.
@@ -61,14 +62,31 @@ struct Trial {
 
 impl Aligner<'_> {
     /// Brings points that are left beside valleys onto them, or takes them away.
-    pub fn gather_strays(&mut self, patch: &mut Patch, open: &[bool], effort: &mut Effort) {
+    pub fn gather_strays(
+        &mut self,
+        patch: &mut Patch,
+        open: &[bool],
+        distance: &NominalDistance<3>,
+        effort: &mut Effort,
+    ) {
         let (mut star, mut around) = (Vec::new(), Vec::new());
         for point in 0..patch.points.len() as u32 {
             let is_free = patch.freedom[point as usize] == 7 && open[point as usize];
-            if !is_free || self.depths[point as usize] < FAINT {
+            let own = self.depths[point as usize];
+            if !is_free || own < FAINT {
                 continue;
             }
-            let Some((bottom, size)) = self.bottom(patch, point, &mut star, &mut around) else {
+            // look for the bottom before the neighbours, which takes longer
+            let at = patch.points[point as usize];
+            let Some(shift) = self.valley.fall(&at, REACH * distance.at(&at)) else { continue };
+            let bottom: Point<3> = std::array::from_fn(|k| at[k] + shift[k]);
+            let depth = self.valley.depth(&bottom);
+            if depth < SHALLOW * LEAST_DEPTH || own > BESIDE * depth {
+                continue;
+            }
+            let Some(size) =
+                self.is_stray(patch, point, (&bottom, depth), (&mut star, &mut around))
+            else {
                 continue;
             };
             let trial = self.surroundings(patch, point, &around, bottom, size);
@@ -93,14 +111,15 @@ impl Aligner<'_> {
         }
     }
 
-    /// The bottom of the valley beside a point, and the mean square of its edges; `None` if it is no stray.
-    fn bottom(
+    /// Whether a point beside a valley's bottom, of a given depth there, is left behind by its neighbours: the mean
+    /// square of its edges if it is.
+    fn is_stray(
         &self,
         patch: &mut Patch,
         point: u32,
-        star: &mut Vec<u32>,
-        around: &mut Vec<u32>,
-    ) -> Option<(Point<3>, f64)> {
+        (bottom, depth): (&Point<3>, f64),
+        (star, around): (&mut Vec<u32>, &mut Vec<u32>),
+    ) -> Option<f64> {
         star.clear();
         patch.star(point, star);
         around.clear();
@@ -108,29 +127,24 @@ impl Aligner<'_> {
         around.extend(corners.filter(|&c| c != point));
         around.sort_unstable();
         around.dedup();
-        let depths = around.iter().map(|&c| self.depths[c as usize]);
-        let deepest = depths.clone().fold(0.0, f64::max);
         let own = self.depths[point as usize];
-        if deepest < LEAST_DEPTH || own > BESIDE * deepest {
-            return None;
-        }
-        if depths.filter(|&depth| depth > SHALLOW * deepest).count() < DEEP_NEIGHBOURS {
+        let depths = around.iter().map(|&c| self.depths[c as usize]);
+        let deepest = depths.clone().fold(depth, f64::max);
+        let deep = depths.filter(|&depth| depth > SHALLOW * deepest).count();
+        if deepest < LEAST_DEPTH || depth < SHALLOW * deepest || deep < DEEP_NEIGHBOURS {
             return None;
         }
         let at = patch.points[point as usize];
         let squares = around.iter().map(|&c| distance_squared(&patch.points[c as usize], &at));
         let size = squares.sum::<f64>() / around.len() as f64;
-        let shift = self.valley.fall(&at, REACH * size.sqrt())?;
-        let bottom = std::array::from_fn(|k| at[k] + shift[k]);
-        let is_far = dot(&shift, &shift) > STRAY * STRAY * size;
-        if !is_far || self.valley.depth(&bottom) <= SHALLOW * deepest {
+        if distance_squared(&at, bottom) < STRAY * STRAY * size {
             return None;
         }
         let crossing = |&c: &u32| {
             let ends = own.max(self.depths[c as usize]);
             self.crossing(patch, [point, c], ends)
         };
-        (around.iter().map(crossing).sum::<f64>() > GAIN).then_some((bottom, size))
+        (around.iter().map(crossing).sum::<f64>() > GAIN).then_some(size)
     }
 
     /// A copy of the cells of a point and of its neighbours.
