@@ -3,6 +3,8 @@
 use std::fs;
 use std::path::Path;
 
+use crate::failure::Failure;
+
 /// Bytes that may still be taken: what the system has left, or the control group if that is less.
 /// `None` where the system does not say.
 pub fn available() -> Option<u64> {
@@ -49,6 +51,18 @@ fn group_room(root: &Path, own: &str) -> Option<u64> {
 pub fn text(bytes: u64) -> String {
     let mib = bytes as f64 / (1 << 20) as f64;
     if mib < 1024.0 { format!("{mib:.0} MiB") } else { format!("{:.1} GiB", mib / 1024.0) }
+}
+
+/// Refuses an image whose potential, four bytes a sample, does not fit; `verb` is what may be done to a part of it.
+pub fn check_potential(sample_count: usize, path: &Path, verb: &str) -> Result<(), Failure> {
+    let needed = 4 * sample_count as u64;
+    let Some(available) = available().filter(|&available| needed > available) else {
+        return Ok(());
+    };
+    let (needed, available) = (text(needed), text(available));
+    let message = format!("the potential needs {needed} of memory; {available} are left");
+    let failure = Failure::content(message).about(path);
+    Err(failure.advise(format!("{verb} a box of interest by --crop, or resample the image")))
 }
 
 #[cfg(test)]

@@ -9,6 +9,7 @@ use atomesh::watch::{Phase, Watch};
 use atomesh_draw::{PictureFormat, Style};
 use atomesh_io::image::{AnyImage, WriteReason, write_image};
 
+use super::is_option;
 use crate::dimension::Dimension;
 use crate::failure::Failure;
 use crate::frame_options::{self, FrameOptions};
@@ -92,13 +93,7 @@ fn enhance<const D: usize>(
     watch: &mut Progress,
 ) -> Result<String, Failure> {
     let image = args.frame.place(image).map_err(|f| f.about(&args.image))?;
-    let needed = 4 * image.samples().len() as u64;
-    if let Some(available) = memory::available().filter(|&available| needed > available) {
-        let (needed, available) = (memory::text(needed), memory::text(available));
-        let message = format!("the potential needs {needed} of memory; {available} are left");
-        let failure = Failure::content(message).about(&args.image);
-        return Err(failure.advise("enhance a box of interest by --crop, or resample the image"));
-    }
+    memory::check_potential(image.samples().len(), &args.image, "enhance")?;
     let units = args.units.unwrap_or_default();
     let basis = FeatureOptions { units, ..Default::default() };
     let options = args.features.feature_options(basis);
@@ -109,10 +104,7 @@ fn enhance<const D: usize>(
     let Enhanced { values, constant } = enhance_mixture(&mixture, &options, |_| &image, watch)
         .map_err(|e| match e {
             EnhanceError::Cancelled(_) => Failure::cancelled(),
-            EnhanceError::EdgeScale { .. }
-            | EnhanceError::Smooth { .. }
-            | EnhanceError::Denoise(_)
-            | EnhanceError::Option { .. } => Failure::misuse(e),
+            _ if is_option(&e) => Failure::misuse(e),
             _ => Failure::content(e).about(&args.image),
         })?;
     if constant {

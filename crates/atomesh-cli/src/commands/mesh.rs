@@ -18,6 +18,7 @@ use atomesh::voronoi::PolyReport;
 use atomesh_io::image::{AnyImage, ReadOptions};
 use serde_json::json;
 
+use super::is_option;
 use crate::dimension::Dimension;
 use crate::failure::Failure;
 use crate::frame_options;
@@ -179,13 +180,7 @@ impl Job<'_> {
     ) -> Result<(Prepared<'m, D>, Option<Image<D>>), Failure> {
         let mut options = self.run.mesh_options::<D>()?;
         options.memory_limit = memory::available();
-        let needed = 4 * image.samples().len() as u64;
-        if let Some(available) = options.memory_limit.filter(|&available| needed > available) {
-            let (needed, available) = (memory::text(needed), memory::text(available));
-            let message = format!("the potential needs {needed} of memory; {available} are left");
-            let failure = Failure::content(message).about(self.path);
-            return Err(failure.advise("mesh a box of interest by --crop, or resample the image"));
-        }
+        memory::check_potential(image.samples().len(), self.path, "mesh")?;
         let input = &self.run.input;
         let mut field = |path: &Option<PathBuf>| {
             path.as_deref().map(|p| self.read_field(p, dimension, watch)).transpose()
@@ -411,14 +406,9 @@ impl Job<'_> {
                 };
                 field_failure(&error, path)
             }
+            PipelineError::Enhance(e) if is_option(e) => Failure::misuse(error),
             PipelineError::Distance(_)
             | PipelineError::Potential(PotentialError::Weight { .. })
-            | PipelineError::Enhance(
-                EnhanceError::EdgeScale { .. }
-                | EnhanceError::Smooth { .. }
-                | EnhanceError::Denoise(_)
-                | EnhanceError::Option { .. },
-            )
             | PipelineError::Lattice(LatticeError::SpacingFactor { .. })
             | PipelineError::Optimize(OptimizeError::Option { .. })
             | PipelineError::Improve(ImproveError::MinAngle { .. }) => Failure::misuse(error),

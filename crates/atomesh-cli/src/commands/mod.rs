@@ -11,6 +11,7 @@ pub mod report;
 pub mod sample;
 pub mod synth;
 
+use atomesh::enhance::EnhanceError;
 use atomesh::measure::MeasureError;
 
 use crate::failure::Failure;
@@ -21,4 +22,10 @@ fn measure_failure(error: MeasureError) -> Failure {
         MeasureError::Cancelled(_) => Failure::cancelled(),
         _ => Failure::content(error),
     }
+}
+
+/// Whether an option is to blame, and not the image.
+fn is_option(error: &EnhanceError) -> bool {
+    use EnhanceError::{Denoise, EdgeScale, Option, Smooth};
+    matches!(error, EdgeScale { .. } | Smooth { .. } | Denoise(_) | Option { .. })
 }

@@ -24,9 +24,9 @@ pub(crate) struct Crest<const D: usize> {
     pub strength: f32,
 }
 
-/// How far from its point a crest is taken to go on, straight on, in samples: at least half of what lies between
-/// neighbours on a sheet across a volume's diagonal, √(2/3), and a little.
-const PATCH: f64 = 0.9;
+/// How far from its point a crest is taken to go on, straight on, in samples along its steepest axis: at least half of what
+/// lies between neighbours, which on a line just off the diagonal is a whole diagonal, √2, and a little.
+const PATCH: f64 = 1.01;
 
 /// Where valleys end, in standard deviations, as kernels do: b is −3·10⁻⁴ there.
 const TRUNCATE: f64 = 4.0;

@@ -85,8 +85,7 @@ pub(crate) fn edge_crests<const D: usize>(
     options.check()?;
     let Some(unit) = Unit::new(values) else { return Ok(Vec::new()) };
     check(watch, Phase::Potential, 0.0, None)?;
-    let least = grid.least_step();
-    let grid = Grid { step: grid.step.map(|step| step / least), ..*grid };
+    let grid = grid.in_least_steps();
     let noise = noise(&unit, grid.shape);
     let contrast = 0.5 * f64::from(unit.quantile(1.0 - ODD) - unit.quantile(ODD));
     let sigma = options.scale.unwrap_or_else(|| clear_scale::<D>(noise, contrast));

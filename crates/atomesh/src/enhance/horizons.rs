@@ -104,8 +104,7 @@ pub(crate) fn horizons<const D: usize>(
     options.check()?;
     let Some(unit) = Unit::new(values) else { return Ok(Vec::new()) };
     check(watch, Phase::Potential, 0.0, None)?;
-    let least = grid.least_step();
-    let grid = Grid { step: grid.step.map(|step| step / least), ..*grid };
+    let grid = grid.in_least_steps();
     let middle = unit.quantile(0.5);
     let fill = |start: usize, out: &mut [f32]| {
         unit.fill(start, out);

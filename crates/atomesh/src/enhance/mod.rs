@@ -520,10 +520,8 @@ fn edges<const D: usize>(
         EdgeOperator::Prewitt => Stencil::Prewitt,
         EdgeOperator::Gaussian | EdgeOperator::Crest => Stencil::Gaussian(options.edge_scale),
     };
-    let mut grid = image.frame().grid(options.units);
     // only the steps' ratios matter, and ratios are safe in single precision
-    let least = grid.least_step();
-    grid.step = grid.step.map(|step| step / least);
+    let grid = image.frame().grid(options.units).in_least_steps();
     let fill = |start, out: &mut [f32]| unit.fill(start, out);
     let values = magnitude(fill, &grid, stencil, &mut |done| {
         check(watch, Phase::Potential, 0.1 + 0.5 * done, None)

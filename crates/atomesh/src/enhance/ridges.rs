@@ -84,8 +84,7 @@ pub(crate) fn ridges<const D: usize>(
     options.check()?;
     let Some(unit) = Unit::new(values) else { return Ok(Vec::new()) };
     check(watch, Phase::Potential, 0.0, None)?;
-    let least = grid.least_step();
-    let grid = Grid { step: grid.step.map(|step| step / least), ..*grid };
+    let grid = grid.in_least_steps();
     let signs: &[f32] = match options.polarity {
         Polarity::Bright => &[1.0],
         Polarity::Dark => &[-1.0],

@@ -105,6 +105,12 @@ impl<const D: usize> Grid<D> {
     pub fn least_step(&self) -> f64 {
         self.step.iter().copied().fold(f64::INFINITY, f64::min)
     }
+
+    /// The same grid measured in its least steps: the least step is 1.
+    pub(crate) fn in_least_steps(&self) -> Self {
+        let least = self.least_step();
+        Self { step: self.step.map(|step| step / least), ..*self }
+    }
 }
 
 /// Places samples in the world: `world = origin + direction · (spacing ∘ index)`.

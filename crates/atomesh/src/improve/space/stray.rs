@@ -245,10 +245,9 @@ impl Aligner<'_> {
     fn across(&self, trial: &Trial, whole: &Patch) -> Option<(u32, Point<3>)> {
         let (patch, stray) = (&trial.patch, trial.stray);
         let faces = |&c: &u32| {
-            let on_way = WAY.iter().map(|&share| self.on_way(patch, stray, c, share));
             let ends = self.depth_of(trial, c).max(self.depth_of(trial, stray));
             let is_free = whole.freedom[trial.points[c as usize] as usize] == 7;
-            is_free && on_way.fold(0.0, f64::max) > ends + NOISE
+            is_free && self.crossing(patch, [stray, c], ends) > 0.0
         };
         let into = trial.nearest(faces, 1.0)?;
         let [p, q] = [stray, into].map(|c| patch.points[c as usize]);
