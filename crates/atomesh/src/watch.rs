@@ -25,6 +25,12 @@ pub enum Phase {
     Improve,
     /// Measuring the mesh.
     Measure,
+    /// Writing the equations of flow.
+    Assemble,
+    /// Solving them.
+    Solve,
+    /// Following streamlines.
+    Trace,
     /// Drawing pictures.
     Draw,
     /// Writing files.
@@ -43,6 +49,9 @@ impl Phase {
             Phase::Connect => "connect",
             Phase::Improve => "improve",
             Phase::Measure => "measure",
+            Phase::Assemble => "assemble",
+            Phase::Solve => "solve",
+            Phase::Trace => "trace",
             Phase::Draw => "draw",
             Phase::Write => "write",
         }

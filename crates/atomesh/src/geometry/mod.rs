@@ -16,7 +16,7 @@ pub use bounds::Bounds;
 pub use compact::{BLOCK, compact_order};
 pub(crate) use order::shares;
 pub use order::{hilbert_order, lexicographic};
-pub(crate) use sets::Sets;
+pub use sets::Sets;
 pub use simplex::Simplex;
 
 /// A point, or a vector, in `D` dimensions: x, y (and z).

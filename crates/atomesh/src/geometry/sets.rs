@@ -2,7 +2,7 @@
 
 /// Disjoint sets of the numbers 0, 1, 2 …; the least of a set is its root.
 #[derive(Clone, Debug, Default)]
-pub(crate) struct Sets(Vec<u32>);
+pub struct Sets(Vec<u32>);
 
 impl Sets {
     /// So many sets of one number each.

@@ -1,0 +1,1 @@
+//! Discontinuous Galerkin on triangles and tetrahedra.

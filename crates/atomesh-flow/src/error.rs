@@ -1,0 +1,127 @@
+//! Why flow cannot be computed.
+
+use atomesh::watch::Cancelled;
+
+use crate::solve::SolveError;
+
+/// Why flow cannot be computed.
+#[derive(Clone, Debug, PartialEq, thiserror::Error)]
+#[non_exhaustive]
+pub enum FlowError {
+    /// A permeability that is none.
+    #[error(
+        "the permeability of cell {cell} is {value:?}; expected a number above 0, or a symmetric tensor whose \
+         principal values are above 0"
+    )]
+    Permeability {
+        /// The cell.
+        cell: usize,
+        /// Its tensor, row by row.
+        value: Vec<f64>,
+    },
+    /// There is not one permeability for each cell.
+    #[error("permeabilities of {found} cells; the mesh has {expected}")]
+    PermeabilityCount {
+        /// The number given.
+        found: usize,
+        /// The number of cells.
+        expected: usize,
+    },
+    /// A tensor where only a number serves.
+    #[error(
+        "the permeability is a tensor, which two-point flux on Voronoi cells answers wrongly; expected one number \
+         for each cell, or triangles or tetrahedra, which the discontinuous Galerkin scheme takes"
+    )]
+    Tensor,
+    /// No facets of that name.
+    #[error("no facets are named {name:?}; known are {known}")]
+    Group {
+        /// The name asked for.
+        name: String,
+        /// The names that there are.
+        known: String,
+    },
+    /// A condition on facets inside the mesh, or a barrier on the boundary.
+    #[error("the facets named {name:?} {found}; expected {expected}")]
+    Place {
+        /// The group's name.
+        name: String,
+        /// Where facets of it lie.
+        found: &'static str,
+        /// Where they should.
+        expected: &'static str,
+    },
+    /// A multiplier outside 0…1.
+    #[error("the multiplier of {name:?} is {value}; expected 0 to 1")]
+    Multiplier {
+        /// The barrier's group.
+        name: String,
+        /// The value found.
+        value: f64,
+    },
+    /// A rate, pressure or flux that is not a finite number.
+    #[error("the {what} of {name:?} is {value}; expected a finite number")]
+    NotFinite {
+        /// The well or group.
+        name: String,
+        /// Rate, pressure or flux.
+        what: &'static str,
+        /// The value found.
+        value: f64,
+    },
+    /// A well outside the mesh.
+    #[error("the well {name:?} at {place:?} lies outside the mesh")]
+    WellOutside {
+        /// The well.
+        name: String,
+        /// Its place.
+        place: Vec<f64>,
+    },
+    /// A well without a radius, or with one that is too large.
+    #[error(
+        "the well {name:?} has the radius {found}; expected one above 0 and below {equivalent}, the equivalent radius of its cells"
+    )]
+    WellRadius {
+        /// The well.
+        name: String,
+        /// Its radius, 0 where there is none.
+        found: f64,
+        /// The equivalent radius of its cells.
+        equivalent: f64,
+    },
+    /// What goes into a compartment without a pressure does not come out.
+    #[error(
+        "compartment {compartment} ({cells} cells, {share:.3} of the mesh, with {inside}) has no pressure that is \
+         fixed, and {rate} flows in; expected rates that sum to 0, or a pressure, or no barrier around it"
+    )]
+    Unbalanced {
+        /// Its number, from 1.
+        compartment: usize,
+        /// How many cells it has.
+        cells: usize,
+        /// Its share of the mesh's volume.
+        share: f64,
+        /// Its wells and boundaries.
+        inside: String,
+        /// What flows in, the sum of all rates.
+        rate: f64,
+    },
+    /// An order that there is no basis for.
+    #[error("order {found} of the {form} form; expected {least} to {most}")]
+    Order {
+        /// The order asked for.
+        found: usize,
+        /// The form's name.
+        form: &'static str,
+        /// The lowest order that is stable.
+        least: usize,
+        /// The highest order that there is.
+        most: usize,
+    },
+    /// The linear equations were not solved.
+    #[error(transparent)]
+    Solve(#[from] SolveError),
+    /// The watch ended the work.
+    #[error(transparent)]
+    Cancelled(#[from] Cancelled),
+}

@@ -1,0 +1,113 @@
+//! What flows where, by names and places.
+
+use atomesh::geometry::Point;
+
+use crate::permeability::Permeability;
+
+/// A value everywhere: a number, or a function of the place.
+#[derive(Clone, Copy)]
+pub enum Value<'a, const D: usize> {
+    /// The same everywhere.
+    Constant(f64),
+    /// A function of the place, in the mesh's coordinates.
+    Field(&'a (dyn Fn(&Point<D>) -> f64 + Sync)),
+}
+
+impl<const D: usize> Value<'_, D> {
+    /// The value at a place.
+    pub fn at(&self, place: &Point<D>) -> f64 {
+        match self {
+            Self::Constant(value) => *value,
+            Self::Field(field) => field(place),
+        }
+    }
+}
+
+impl<const D: usize> std::fmt::Debug for Value<'_, D> {
+    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
+        match self {
+            Self::Constant(value) => write!(f, "Constant({value})"),
+            Self::Field(_) => write!(f, "Field(..)"),
+        }
+    }
+}
+
+/// What holds on a part of the boundary. Where nothing is said nothing flows.
+#[derive(Clone, Copy, Debug)]
+pub enum Condition<'a, const D: usize> {
+    /// The pressure.
+    Pressure(Value<'a, D>),
+    /// The flow into the domain through a unit of area (3-D) or length (2-D): `k ∂p/∂n`, n outward.
+    Flux(Value<'a, D>),
+}
+
+/// A condition on the facets of a group.
+#[derive(Clone, Debug)]
+pub struct Boundary<'a, const D: usize> {
+    /// The group's name, such as `xmin`.
+    pub group: String,
+    /// What holds there.
+    pub condition: Condition<'a, D>,
+}
+
+/// A group of facets that hinder flow.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Barrier {
+    /// The group's name, such as `feature-1`.
+    pub group: String,
+    /// What share of the flow passes, 0…1, that would pass between the two cells beside the facet for the same
+    /// difference of their mean pressures: 0 seals, 1 does nothing. It multiplies two-point transmissibilities;
+    /// for other schemes it is the resistance `(1/m − 1)·(δ₁/k₁ + δ₂/k₂)`, δ the distances of the cells' centres
+    /// from the facet.
+    pub multiplier: f64,
+}
+
+/// How a well is run.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub enum Control {
+    /// By its rate: what flows into the domain in a unit of time, below 0 what is taken out.
+    Rate(f64),
+    /// By the pressure at its wall; it needs a radius.
+    Pressure(f64),
+}
+
+/// A well: a vertical line that a plane is seen along (2-D), a point (3-D).
+#[derive(Clone, Debug, PartialEq)]
+pub struct Well<const D: usize> {
+    /// What reports call it.
+    pub name: String,
+    /// Where it is, inside the mesh.
+    pub place: Point<D>,
+    /// How it is run.
+    pub control: Control,
+    /// Its radius, above 0 and less than the equivalent radius of the cells around it.
+    pub radius: Option<f64>,
+}
+
+/// Steady flow `−∇·(k∇p) = q` with wells, conditions on the boundary, and barriers.
+#[derive(Clone, Debug)]
+pub struct Problem<'a, const D: usize> {
+    /// The permeability k.
+    pub permeability: Permeability<D>,
+    /// q: what flows into the domain in a unit of volume (3-D) or area (2-D), wells apart.
+    pub source: Option<Value<'a, D>>,
+    /// The wells.
+    pub wells: Vec<Well<D>>,
+    /// Conditions on the boundary; a facet that two groups hold obeys the one named last.
+    pub boundaries: Vec<Boundary<'a, D>>,
+    /// Barriers; a facet that two groups hold obeys the one named last.
+    pub barriers: Vec<Barrier>,
+}
+
+impl<const D: usize> Default for Problem<'_, D> {
+    /// Permeability 1, and nothing that flows.
+    fn default() -> Self {
+        Self {
+            permeability: Permeability::Uniform(1.0),
+            source: None,
+            wells: Vec::new(),
+            boundaries: Vec::new(),
+            barriers: Vec::new(),
+        }
+    }
+}

@@ -1,0 +1,130 @@
+//! The answer: pressures, velocities, fluxes, and whether what flows in flows out.
+
+use atomesh::geometry::{Point, difference};
+
+use crate::grid::Grid;
+use crate::setting::Setting;
+use crate::solve::SolveReport;
+
+/// What a well does.
+#[derive(Clone, Debug, PartialEq, serde::Serialize)]
+pub struct WellFlow {
+    /// Its name.
+    pub name: String,
+    /// The compartment that it is in, from 1.
+    pub compartment: usize,
+    /// What it brings into the domain in a unit of time; below 0 what it takes out.
+    pub rate: f64,
+    /// The mean pressure of its cells.
+    pub cell_pressure: f64,
+    /// The pressure at its wall; `None` without a radius.
+    pub wall_pressure: Option<f64>,
+}
+
+/// What flows in and out.
+#[derive(Clone, Debug, PartialEq, serde::Serialize)]
+pub struct Balance {
+    /// Into the domain through wells of positive rate.
+    pub wells_in: f64,
+    /// Out of it through wells of negative rate; 0 or more.
+    pub wells_out: f64,
+    /// In through the boundary.
+    pub boundary_in: f64,
+    /// Out through the boundary; 0 or more.
+    pub boundary_out: f64,
+    /// What the source term q brings.
+    pub source: f64,
+    /// In less out.
+    pub error: f64,
+    /// The largest of |in − out| of a cell.
+    pub cell_error: f64,
+    /// All that flows in: the scale of the errors.
+    pub scale: f64,
+}
+
+impl Balance {
+    /// The larger of the two errors over the scale; 0 if nothing flows.
+    pub fn relative_error(&self) -> f64 {
+        if self.scale > 0.0 { self.cell_error.max(self.error.abs()) / self.scale } else { 0.0 }
+    }
+}
+
+/// Steady flow on a grid.
+#[derive(Clone, Debug)]
+pub struct Solution<const D: usize> {
+    /// The mean pressure of each cell (Voronoi cells: that of the site).
+    pub pressures: Vec<f64>,
+    /// What flows through each facet in a unit of time, out of its `cell`.
+    pub fluxes: Vec<f64>,
+    /// What the source term and wells bring into each cell.
+    pub sources: Vec<f64>,
+    /// The wells, in the problem's order.
+    pub wells: Vec<WellFlow>,
+    /// Compartments in which the pressure is known up to a constant only, from 1: it is 0 in the mean of one cell.
+    pub pinned: Vec<usize>,
+    /// How the equations were solved.
+    pub solve: SolveReport,
+}
+
+impl<const D: usize> Solution<D> {
+    /// The mean Darcy velocity of each cell, from its fluxes: `v = Σ F_f (x_f − x_K) / |K|`, F_f outward: that
+    /// of the field of the least order that has these fluxes (Raviart & Thomas 1977 in simplices), exact
+    /// where the velocity is constant.
+    pub fn velocities(&self, grid: &Grid<D>) -> Vec<Point<D>> {
+        let velocity = |cell: usize| {
+            let centre = &grid.centroids()[cell];
+            let mut velocity = [0.0; D];
+            for &number in grid.facets_of(cell) {
+                let facet = &grid.facets()[number as usize];
+                let out = if facet.cell as usize == cell { 1.0 } else { -1.0 };
+                let way = difference(&facet.centroid, centre);
+                for axis in 0..D {
+                    velocity[axis] += out * self.fluxes[number as usize] * way[axis];
+                }
+            }
+            velocity.map(|x| x / grid.measures()[cell])
+        };
+        (0..grid.cell_count()).map(velocity).collect()
+    }
+
+    /// What flows in and out, from fluxes and sources alone.
+    pub fn balance(&self, grid: &Grid<D>) -> Balance {
+        let mut balance = Balance {
+            wells_in: self.wells.iter().map(|well| well.rate.max(0.0)).sum(),
+            wells_out: self.wells.iter().map(|well| (-well.rate).max(0.0)).sum(),
+            boundary_in: 0.0,
+            boundary_out: 0.0,
+            source: 0.0,
+            error: 0.0,
+            cell_error: 0.0,
+            scale: 0.0,
+        };
+        let mut excess = self.sources.clone();
+        for (facet, &flux) in grid.facets().iter().zip(&self.fluxes) {
+            excess[facet.cell as usize] -= flux;
+            match facet.neighbour {
+                Some(cell) => excess[cell as usize] += flux,
+                None if flux < 0.0 => balance.boundary_in -= flux,
+                None => balance.boundary_out += flux,
+            }
+        }
+        let wells: f64 = self.wells.iter().map(|well| well.rate).sum();
+        balance.source = self.sources.iter().sum::<f64>() - wells;
+        balance.error = excess.iter().sum();
+        balance.cell_error = excess.iter().fold(0.0, |most, x| most.max(x.abs()));
+        let source = balance.source.max(0.0);
+        let inward = balance.wells_in + balance.boundary_in + source;
+        let outward = balance.wells_out + balance.boundary_out + (-balance.source).max(0.0);
+        balance.scale = inward.max(outward);
+        balance
+    }
+
+    /// The most that flows through a sealed facet, as a share of all that flows.
+    pub fn leak(&self, grid: &Grid<D>, setting: &Setting<'_, D>) -> f64 {
+        let scale = self.balance(grid).scale;
+        let sealed = setting.multipliers().iter().zip(&self.fluxes);
+        let most =
+            sealed.filter(|(m, _)| **m == 0.0).fold(0.0_f64, |most, (_, f)| most.max(f.abs()));
+        if scale > 0.0 { most / scale } else { 0.0 }
+    }
+}

@@ -1,0 +1,1 @@
+//! Streamlines and times of flight.

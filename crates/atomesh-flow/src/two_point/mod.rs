@@ -1,0 +1,1 @@
+//! Two-point flux on Voronoi cells.
