@@ -11,6 +11,7 @@ mod failure;
 mod frame_options;
 mod memory;
 mod mesh_file;
+mod meshing;
 mod outputs;
 mod progress;
 mod report_page;

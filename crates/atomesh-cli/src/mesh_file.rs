@@ -2,6 +2,7 @@
 
 use std::path::Path;
 
+use atomesh::mesh::Mesh;
 use atomesh_io::mesh::{AnyMesh, MeshReadError, read_mesh};
 
 use crate::failure::Failure;
@@ -24,4 +25,17 @@ pub fn read(path: &Path) -> Result<AnyMesh, Failure> {
         MeshReadError::Io(e) => Failure::content(format!("cannot be read: {e}")).about(path),
         _ => Failure::content(e).about(path),
     })
+}
+
+/// The mesh with cells of positive orientation: those that another program wrote the other way are turned.
+pub fn turned_right<const D: usize>(mesh: Mesh<D>) -> Mesh<D> {
+    let wrong: Vec<bool> = mesh.simplices().map(|simplex| simplex.orientation() < 0.0).collect();
+    if !wrong.contains(&true) {
+        return mesh;
+    }
+    let (points, mut corners) = mesh.into_parts();
+    for (cell, _) in wrong.iter().enumerate().filter(|(_, wrong)| **wrong) {
+        corners.swap(cell * (D + 1) + D - 1, cell * (D + 1) + D);
+    }
+    Mesh::new(points, corners).expect("the same points and corners")
 }

@@ -5,7 +5,7 @@ use std::path::{Path, PathBuf};
 
 use atomesh::features::FeatureFacetOptions;
 use atomesh::image::{Image, Samples};
-use atomesh::mesh::{Mesh, Tags};
+use atomesh::mesh::{Mesh, Regions, Tags};
 use atomesh::pipeline::Outcome;
 use atomesh::watch::{Phase, Watch};
 use atomesh_draw::{PictureFormat, Style};
@@ -40,6 +40,8 @@ pub struct Outputs {
     is_quadratic: bool,
     /// Facets with b up to this are tagged as features.
     tag_features: Option<f64>,
+    /// The parts that features cut off become regions, unless they have fewer cells than this.
+    regions: Option<usize>,
     /// Whether the image comes from a format in which z is up where it grows.
     z_is_height: bool,
 }
@@ -153,6 +155,17 @@ impl Outputs {
             let message = "the format holds no tags; expected .vtu, .msh, .msh2, .inp or polyMesh";
             return Err(Failure::misuse(message).about(&mesh));
         }
+        let regions = options.regions.filter(|&wanted| wanted);
+        if regions.is_some() && tag_features.is_none() {
+            let message =
+                "--regions without --tag-features; expected both, since features cut the mesh";
+            return Err(Failure::misuse(message));
+        }
+        if let (Some(_), Some(labels)) = (regions, &run.input.labels) {
+            let message = "are regions already; expected them or --regions";
+            return Err(Failure::misuse(message).about(labels));
+        }
+        let least = run.regions.least_island.unwrap_or(0) as usize;
         if let (Some(page), true) = (&html, run.is_voronoi()) {
             let failure =
                 Failure::misuse("a page shows triangles or tetrahedra, not Voronoi cells");
@@ -169,6 +182,7 @@ impl Outputs {
             potential,
             is_quadratic,
             tag_features,
+            regions: regions.map(|_| least),
             z_is_height,
         })
     }
@@ -352,7 +366,10 @@ impl Outputs {
         let found = outcome.features(world, &options, watch).map_err(|e| {
             if e.is_cancelled() { Failure::cancelled() } else { Failure::misuse(e) }
         })?;
-        let features = found.tags(world).map_err(Failure::content)?;
+        let mut features = found.tags(world).map_err(Failure::content)?;
+        if let Some(least) = self.regions {
+            features = with_regions(features, world, found.regions(world, least))?;
+        }
         watch.say(&format!(
             "{}: {} features of {} facets tagged",
             self.mesh.display(),
@@ -361,6 +378,19 @@ impl Outputs {
         ));
         sides.merge(features).map_err(Failure::content)
     }
+}
+
+/// The tags with regions beside them.
+///
+/// # Errors
+/// [`Failure`] if they have regions.
+pub fn with_regions<const D: usize>(
+    tags: Tags<D>,
+    mesh: &Mesh<D>,
+    regions: Regions,
+) -> Result<Tags<D>, Failure> {
+    let regions = Tags::new(mesh, Vec::new(), Some(regions)).map_err(Failure::content)?;
+    tags.merge(regions).map_err(Failure::content)
 }
 
 fn msh_version(text: &str) -> Result<MshVersion, Failure> {

@@ -334,6 +334,11 @@ section! {
         #[arg(long, value_name = "B", allow_hyphen_values = true,
             value_parser = number_in(-1.0, 1.0, "a number from -1 to 1"))]
         pub tag_features: f64,
+        /// Write the parts into which the tagged features cut the mesh as regions of cells, 1, 2 ...; parts smaller
+        /// than --least-island go to their neighbours
+        #[arg(long, value_name = "BOOL", num_args = 0..=1, require_equals = true,
+            default_missing_value = "true")]
+        pub regions: bool,
         /// List of the connections of Voronoi cells, for flow simulators: a head as JSON, and beside
         /// it NAME-cells.csv, NAME-connections.csv and NAME-boundary.csv
         #[arg(long, value_name = "NAME.json")]

@@ -111,3 +111,40 @@ impl<const D: usize> Default for Problem<'_, D> {
         }
     }
 }
+
+impl<const D: usize> Problem<'_, D> {
+    /// Gives the wells numbered `open` equal rates that balance those of the other wells.
+    ///
+    /// # Panics
+    /// If there is no such well.
+    pub fn balance_wells(&mut self, open: &[usize]) {
+        let rate = |(number, well): (usize, &Well<D>)| match well.control {
+            Control::Rate(rate) if !open.contains(&number) => rate,
+            _ => 0.0,
+        };
+        let others: f64 = self.wells.iter().enumerate().map(rate).sum();
+        for &number in open {
+            self.wells[number].control = Control::Rate(-others / open.len() as f64);
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn open_wells_share_what_the_others_leave() {
+        let well =
+            |control: Control| Well { name: String::new(), place: [0.0; 2], control, radius: None };
+        let rates =
+            [Control::Rate(3.0), Control::Rate(9.0), Control::Pressure(5.0), Control::Rate(-1.0)];
+        let wells = rates.into_iter().map(well).chain([well(Control::Rate(0.0))]).collect();
+        let mut problem = Problem { wells, ..Problem::default() };
+        problem.balance_wells(&[1, 4]);
+        let controls: Vec<Control> = problem.wells.iter().map(|w| w.control).collect();
+        assert_eq!(controls[1], Control::Rate(-1.0));
+        assert_eq!(controls[4], Control::Rate(-1.0));
+        assert_eq!(controls[2], Control::Pressure(5.0));
+    }
+}

@@ -60,6 +60,13 @@ pub struct FeaturesArgs {
     /// a folder named polyMesh
     #[arg(long, value_name = "MESH")]
     mesh_output: Option<PathBuf>,
+    /// Write the parts into which the features cut the mesh as its regions of cells, 1, 2 ..., in place of those
+    /// that it has
+    #[arg(long, requires = "mesh_output")]
+    regions: bool,
+    /// With --regions, parts of fewer cells go to their neighbours
+    #[arg(long, value_name = "COUNT", default_value_t = 0, requires = "regions")]
+    least_island: usize,
     /// File for the features in numbers (length or area, mean of b, box), as JSON
     #[arg(long, value_name = "JSON")]
     json: Option<PathBuf>,
@@ -264,7 +271,7 @@ fn write<const D: usize>(
         })?;
     }
     if let Some(path) = &args.mesh_output {
-        write_tagged(path, loaded, tags(loaded, found)?, watch)?;
+        write_tagged(path, loaded, tags(args, loaded, found)?, watch)?;
     }
     if let Some(path) = &args.json {
         let report = json!({
@@ -278,7 +285,11 @@ fn write<const D: usize>(
 }
 
 /// The mesh's own tags without features that it had; the sides of its box if it has none; the features.
-fn tags<const D: usize>(loaded: &LoadedMesh<D>, found: &FeatureSet<D>) -> Result<Tags<D>, Failure> {
+fn tags<const D: usize>(
+    args: &FeaturesArgs,
+    loaded: &LoadedMesh<D>,
+    found: &FeatureSet<D>,
+) -> Result<Tags<D>, Failure> {
     let mesh = &loaded.mesh;
     let is_feature = |group: &&FacetGroup<D>| {
         let number = group.name.strip_prefix("feature-");
@@ -287,8 +298,11 @@ fn tags<const D: usize>(loaded: &LoadedMesh<D>, found: &FeatureSet<D>) -> Result
     let groups = loaded.tags.facet_groups();
     let kept: Vec<_> = groups.iter().filter(|group| !is_feature(group)).cloned().collect();
     let has_groups = !kept.is_empty();
-    let mut tags =
-        Tags::new(mesh, kept, loaded.tags.regions().cloned()).map_err(Failure::content)?;
+    let regions = match args.regions {
+        true => Some(found.regions(mesh, args.least_island)),
+        false => loaded.tags.regions().cloned(),
+    };
+    let mut tags = Tags::new(mesh, kept, regions).map_err(Failure::content)?;
     if !has_groups {
         tags = own_sides(mesh, loaded.frame.as_ref()).merge(tags).map_err(Failure::content)?;
     }

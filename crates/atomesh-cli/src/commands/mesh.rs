@@ -2,32 +2,23 @@
 
 use std::path::{Path, PathBuf};
 
-use atomesh::distance::DistanceError;
-use atomesh::enhance::{EnhanceError, Features};
 use atomesh::image::Image;
-use atomesh::improve::{ImproveError, ImproveReport};
-use atomesh::lattice::LatticeError;
+use atomesh::improve::ImproveReport;
 use atomesh::measure::{AlignmentReport, ShapeReport, shape};
-use atomesh::optimize::OptimizeError;
-use atomesh::pipeline::{
-    Inputs, MeshReport, Outcome, PipelineError, Prepared, VoronoiReport, prepare,
-};
-use atomesh::potential::PotentialError;
-use atomesh::region::RegionError;
+use atomesh::pipeline::{MeshReport, Outcome, PipelineError, Prepared, VoronoiReport};
 use atomesh::voronoi::PolyReport;
-use atomesh_io::image::{AnyImage, ReadOptions};
+use atomesh_io::image::AnyImage;
 use serde_json::json;
 
-use super::is_option;
 use crate::dimension::Dimension;
 use crate::failure::Failure;
 use crate::frame_options;
 use crate::memory;
+use crate::meshing::{Meshing, labels_alone, shown_path};
 use crate::outputs::{Outputs, write_bytes};
 use crate::progress::{Progress, Verbosity, writing};
 use crate::report_page::{PageParts, option_rows, write_page};
 use crate::run_config::RunConfig;
-use crate::values::Text;
 
 /// Turn an image into a mesh that follows it
 ///
@@ -90,11 +81,7 @@ pub fn run(args: MeshArgs, watch: &mut Progress) -> Result<String, Failure> {
             .map_err(|e| Failure::content(format!("cannot be read: {e}")).about(path))?;
         run = run.or(RunConfig::parse(&text).map_err(|f| f.about(path))?);
     }
-    if run.input.image.is_none() && run.input.potential.is_none() && run.input.labels.is_some() {
-        // labels alone: they are the image, and where they meet the features
-        let labels = || Text(Features::Labels.into());
-        run.features.features.get_or_insert_with(labels);
-    }
+    labels_alone(&mut run);
     run.check()?;
     let shown = shown_path(&run)?.to_path_buf();
     let outputs = if args.dry_run { None } else { Some(Outputs::new(&run, &shown)?) };
@@ -110,16 +97,6 @@ pub fn run(args: MeshArgs, watch: &mut Progress) -> Result<String, Failure> {
     }
 }
 
-/// The image that gives the frame: the potential where there is no other.
-fn shown_path(run: &RunConfig) -> Result<&Path, Failure> {
-    let input = &run.input;
-    let paths = [&input.image, &input.potential, &input.labels];
-    match paths.into_iter().flatten().next() {
-        Some(path) => Ok(path),
-        None => Err(Failure::misuse("nothing to mesh; expected IMAGE, or --potential FILE")),
-    }
-}
-
 /// A run whose options are known.
 struct Job<'a> {
     run: &'a RunConfig,
@@ -130,21 +107,23 @@ struct Job<'a> {
 }
 
 impl Job<'_> {
+    fn meshing(&self) -> Meshing<'_> {
+        Meshing { run: self.run, path: self.path }
+    }
+
     fn run<const D: usize>(
         &self,
         image: Image<D>,
         dimension: &Dimension<D>,
         watch: &mut Progress,
     ) -> Result<String, Failure> {
-        let image = self.run.frame.place(image).map_err(|f| f.about(self.path))?;
-        let (prepared, image) = self.prepare(image, dimension, watch)?;
-        for warning in prepared.warnings() {
-            watch.say(&format!("warning: {}: {warning}", self.path.display()));
-        }
+        let keep_image = self.outputs.as_ref().is_some_and(Outputs::needs_image);
+        let meshing = self.meshing();
+        let (prepared, image) = meshing.prepare(image, dimension, keep_image, watch)?;
         let Some(outputs) = &self.outputs else {
             return Ok(expectation(&prepared, dimension, self.run.is_voronoi()));
         };
-        let outcome = prepared.run(watch).map_err(|e| self.failure(e))?;
+        let outcome = prepared.run(watch).map_err(|e| meshing.failure(e))?;
         let measured = image.as_ref().filter(|_| outputs.needs_report());
         let figures = self.measure(&outcome, measured, watch)?;
         let _guard = writing();
@@ -171,75 +150,6 @@ impl Job<'_> {
         Ok(String::new())
     }
 
-    /// b(x), d(x) and β(x); the image too if it is needed again.
-    fn prepare<'m, const D: usize>(
-        &self,
-        image: Image<D>,
-        dimension: &'m Dimension<D>,
-        watch: &mut Progress,
-    ) -> Result<(Prepared<'m, D>, Option<Image<D>>), Failure> {
-        let mut options = self.run.mesh_options::<D>()?;
-        options.memory_limit = memory::available();
-        memory::check_potential(image.samples().len(), self.path, "mesh")?;
-        let input = &self.run.input;
-        let mut field = |path: &Option<PathBuf>| {
-            path.as_deref().map(|p| self.read_field(p, dimension, watch)).transpose()
-        };
-        let size_field = field(&input.size_field)?;
-        let weight_field = field(&input.beta_field)?;
-        let mask = field(&input.mask)?;
-        let labels = field(&input.labels)?;
-        // without IMAGE, the potential is the image
-        let potential = if input.image.is_some() { field(&input.potential)? } else { None };
-        if let Some(potential) = &potential {
-            let (found, expected) = (potential.frame().shape(), image.frame().shape());
-            if found != expected {
-                let message = format!("has {found:?} samples (x first); expected {expected:?}");
-                let message = format!("{message}, as {}", self.path.display());
-                return Err(Failure::content(message).about(&self.potential_path()));
-            }
-        }
-        let source = match potential {
-            Some(potential) => {
-                Some(potential.with_frame(*image.frame()).map_err(Failure::content)?)
-            }
-            None => None,
-        };
-        let inputs = Inputs {
-            image: source.as_ref().unwrap_or(&image),
-            is_potential: input.potential.is_some(),
-            size_field: size_field.as_ref(),
-            weight_field: weight_field.as_ref(),
-            mask: mask.as_ref(),
-            labels: labels.as_ref(),
-        };
-        let prepared = prepare(&dimension.method, inputs, options, watch);
-        let prepared = prepared.map_err(|e| self.failure(e))?;
-        let needed = self.outputs.as_ref().is_some_and(Outputs::needs_image);
-        Ok((prepared, needed.then_some(image)))
-    }
-
-    /// An image that must have the shape of the first, its box of interest taken.
-    fn read_field<const D: usize>(
-        &self,
-        path: &Path,
-        dimension: &Dimension<D>,
-        watch: &mut Progress,
-    ) -> Result<Image<D>, Failure> {
-        let options = ReadOptions { raw: None, ..self.run.frame.read_options()? };
-        let any = frame_options::read(path, &options, watch)?;
-        let found = any.dimension();
-        let Some(field) = (dimension.image)(any) else {
-            let message = format!("has {found} axes; expected {D}, as {}", self.path.display());
-            return Err(Failure::content(message).about(path));
-        };
-        self.run.frame.place(field).map_err(|f| f.about(path))
-    }
-
-    fn potential_path(&self) -> PathBuf {
-        self.run.input.potential.clone().unwrap_or_else(|| self.path.into())
-    }
-
     fn measure<const D: usize>(
         &self,
         outcome: &Outcome<D>,
@@ -250,7 +160,7 @@ impl Job<'_> {
         if let Some(cells) = outcome.cells() {
             let mut figures = Figures::default();
             if image.is_some() {
-                let report = outcome.cells_report(watch).map_err(|e| self.failure(e))?;
+                let report = outcome.cells_report(watch).map_err(|e| self.meshing().failure(e))?;
                 (figures.cells, figures.cells_alignment) =
                     report.map(|VoronoiReport { shape, alignment, .. }| (shape, alignment)).unzip();
             } else if !is_quiet {
@@ -260,9 +170,9 @@ impl Job<'_> {
             return Ok(figures);
         }
         if let Some(image) = image {
-            let mut report = outcome.report(watch).map_err(|e| self.failure(e))?;
+            let mut report = outcome.report(watch).map_err(|e| self.meshing().failure(e))?;
             let fidelity = outcome.fidelity(image.samples(), watch);
-            report.fidelity = Some(fidelity.map_err(|e| self.failure(e))?);
+            report.fidelity = Some(fidelity.map_err(|e| self.meshing().failure(e))?);
             let shape = Some(report.shape.clone());
             return Ok(Figures { shape, report: Some(report), ..Figures::default() });
         }
@@ -270,7 +180,7 @@ impl Job<'_> {
             return Ok(Figures::default());
         }
         let shape = shape(outcome.mesh(), outcome.bounds().as_ref(), watch);
-        let shape = shape.map_err(|e| self.failure(PipelineError::Measure(e)))?;
+        let shape = shape.map_err(|e| self.meshing().failure(PipelineError::Measure(e)))?;
         Ok(Figures { shape: Some(shape), ..Figures::default() })
     }
 
@@ -352,77 +262,6 @@ impl Job<'_> {
         };
         let (mesh, style) = (outcome.sample_mesh(), outputs.style(outcome));
         write_page(path, parts, report, (image, &mesh, &style), dimension)
-    }
-
-    /// What the core refuses, in the user's terms.
-    fn failure(&self, error: PipelineError) -> Failure {
-        let lattice = &self.run.lattice;
-        match &error {
-            e if e.is_cancelled() => Failure::cancelled(),
-            PipelineError::LatticeDimension { .. } => Failure::misuse(error).about(self.path),
-            PipelineError::Lattice(LatticeError::SeedOutside { index, .. }) => {
-                let point = lattice.seed_point.iter().flatten().nth(*index);
-                let point = point.map_or_else(String::new, ToString::to_string);
-                Failure::misuse(format!("--seed-point {point} lies outside the image"))
-                    .about(self.path)
-                    .advise("places are in world coordinates; atomesh info IMAGE shows the box")
-            }
-            PipelineError::Enhance(EnhanceError::OutOfRange { .. })
-            | PipelineError::Potential(PotentialError::OutOfRange { .. }) => {
-                Failure::content(error).about(&self.potential_path())
-            }
-            PipelineError::Enhance(EnhanceError::NotFinite { .. }) => {
-                Failure::content(error).about(self.path)
-            }
-            PipelineError::Potential(PotentialError::Weight { index: Some(_), .. }) => {
-                field_failure(&error, self.run.input.beta_field.as_deref())
-            }
-            PipelineError::Region(RegionError::Label { .. }) => {
-                field_failure(&error, self.run.input.labels.as_deref())
-            }
-            PipelineError::Region(_) => field_failure(&error, self.run.input.mask.as_deref()),
-            PipelineError::Distance(_) if self.run.input.size_field.is_some() => {
-                field_failure(&error, self.run.input.size_field.as_deref())
-            }
-            PipelineError::Distance(DistanceError::FieldValue { .. }) => Failure::content(error)
-                .about(self.path)
-                .advise("--frequency needs an image of velocities above 0"),
-            PipelineError::Distance(DistanceError::BelowStep { .. })
-                if lattice.frequency.is_some() =>
-            {
-                Failure::misuse(error)
-                    .about(self.path)
-                    .advise("choose a lower --frequency or fewer --points-per-wavelength")
-            }
-            PipelineError::Distance(DistanceError::BelowStep { .. }) => Failure::misuse(error)
-                .about(self.path)
-                .advise("choose a greater --size, or resample the image"),
-            PipelineError::Shape { name, .. } => {
-                let path = match *name {
-                    "size field" => self.run.input.size_field.as_deref(),
-                    "mask" => self.run.input.mask.as_deref(),
-                    "label image" => self.run.input.labels.as_deref(),
-                    _ => self.run.input.beta_field.as_deref(),
-                };
-                field_failure(&error, path)
-            }
-            PipelineError::Enhance(e) if is_option(e) => Failure::misuse(error),
-            PipelineError::Distance(_)
-            | PipelineError::Potential(PotentialError::Weight { .. })
-            | PipelineError::Lattice(LatticeError::SpacingFactor { .. })
-            | PipelineError::Optimize(OptimizeError::Option { .. })
-            | PipelineError::Improve(ImproveError::MinAngle { .. }) => Failure::misuse(error),
-            _ => Failure::content(error).about(self.path),
-        }
-    }
-}
-
-/// The content of a field is wrong.
-fn field_failure(error: &PipelineError, path: Option<&Path>) -> Failure {
-    let failure = Failure::content(error);
-    match path {
-        Some(path) => failure.about(path),
-        None => failure,
     }
 }
 

@@ -25,7 +25,7 @@ fn measure_failure(error: MeasureError) -> Failure {
 }
 
 /// Whether an option is to blame, and not the image.
-fn is_option(error: &EnhanceError) -> bool {
+pub fn is_option(error: &EnhanceError) -> bool {
     use EnhanceError::{Denoise, EdgeScale, Option, Smooth};
     matches!(error, EdgeScale { .. } | Smooth { .. } | Denoise(_) | Option { .. })
 }

@@ -18,7 +18,8 @@ mod ridges;
 mod tests;
 
 use crate::geometry::{Bounds, dot};
-use crate::mesh::{FacetGroup, Mesh, Tags, TagsError};
+use crate::mesh::{FacetGroup, Mesh, Regions, Tags, TagsError};
+use crate::region::{components, islands};
 use crate::watch::Cancelled;
 pub use field::FacetField;
 use orient::Piece;
@@ -232,6 +233,19 @@ impl<const D: usize> FeatureSet<D> {
     /// [`TagsError`] if it is another mesh.
     pub fn tags(&self, mesh: &Mesh<D>) -> Result<Tags<D>, TagsError> {
         Tags::new(mesh, self.groups(), None)
+    }
+
+    /// The parts into which the features cut the mesh, numbered from 1 in the order of their first cells; those of
+    /// fewer than `least` cells, such as a cell with features on all sides, go to the neighbour that they share
+    /// most facets with. Features that end inside the mesh part nothing.
+    pub fn regions(&self, mesh: &Mesh<D>, least: usize) -> Regions {
+        let walls: Vec<[u32; D]> =
+            self.features.iter().flat_map(|feature| feature.facets.iter().copied()).collect();
+        let mut of_cells = components(mesh, &walls);
+        if least > 1 {
+            islands(mesh, &mut of_cells, least);
+        }
+        Regions { of_cells, names: Vec::new() }
     }
 
     /// Each feature in numbers, in the coordinates of `mesh`: that in which they were found, or the same

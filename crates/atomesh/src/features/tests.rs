@@ -177,6 +177,19 @@ fn a_plane_is_one_surface_with_its_normals_up() {
 }
 
 #[test]
+fn features_that_reach_the_sides_cut_regions_and_others_do_not() {
+    let mesh = grid::<3>(4);
+    let through = chosen(&mesh, &Default::default(), |c| all(c, |p| p[0] == 1.0));
+    let regions = through.regions(&mesh, 0);
+    assert_eq!(regions.ids(), [1, 2]);
+    let of = |id: i32| regions.of_cells.iter().filter(|&&of| of == id).count();
+    assert_eq!((of(1), of(2)), (6 * 16, 6 * 48), "six cells a cube");
+    let half = chosen(&mesh, &Default::default(), |c| all(c, |p| p[0] == 1.0 && p[1] <= 2.0));
+    assert_eq!(half.regions(&mesh, 0).ids(), [1]);
+    assert_eq!(through.regions(&mesh, 97).ids(), [2], "the smaller part is an island");
+}
+
+#[test]
 fn a_hole_of_one_triangle_is_a_gap_too() {
     let mesh = grid::<3>(4);
     let hole = |p: &Point<3>| [[1.0, 1.0], [2.0, 1.0], [2.0, 2.0]].contains(&[p[0], p[1]]);

@@ -121,8 +121,13 @@ impl<const D: usize> Outcome<D> {
     /// The faces of the Voronoi cells that lie on features: |b| is 0.2 or more along them in the mean, in
     /// groups of 2 d (3-D: 2 d²) or more.
     pub fn cell_features(&self) -> Option<FeatureFaces> {
+        self.cell_features_from(FEATURE)
+    }
+
+    /// The same with another value for the least mean of |b| along a face, above 0.
+    pub fn cell_features_from(&self, least: f64) -> Option<FeatureFaces> {
         let least_area = LEAST_FEATURE * self.distance.mean().powi(D as i32 - 1);
-        let of = |cells| feature_faces(cells, &self.potential, FEATURE, least_area);
+        let of = |cells| feature_faces(cells, &self.potential, least, least_area);
         self.cells.as_ref().map(of)
     }
 

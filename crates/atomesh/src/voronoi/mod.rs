@@ -30,6 +30,7 @@ mod dual;
 mod marks;
 mod poly_mesh;
 mod report;
+mod sampled;
 mod tidy;
 mod validate;
 #[cfg(test)]
