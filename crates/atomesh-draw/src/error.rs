@@ -22,6 +22,24 @@ pub enum DrawError {
         /// The samples along the axis.
         count: usize,
     },
+    /// There is not one of something for each of what they are for.
+    #[error("{found} {what}; expected none or {expected}")]
+    Count {
+        /// What there is.
+        what: &'static str,
+        /// How many there are.
+        found: usize,
+        /// How many there should be.
+        expected: usize,
+    },
+    /// A barrier is no facet of the mesh.
+    #[error("barrier {facet}; the mesh has {count} facets")]
+    Facet {
+        /// Its number.
+        facet: u32,
+        /// How many facets there are.
+        count: usize,
+    },
     /// A length or brightness of the style has no meaning.
     #[error("{name} is {value}; expected a finite number above 0{}", limit.map_or(String::new(), |l| format!(" and up to {l}")))]
     Style {

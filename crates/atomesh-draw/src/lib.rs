@@ -10,8 +10,10 @@
 //! on top, x grows to the right. A sample covers the square around its centre, so a picture reaches
 //! half a sample beyond the mesh.
 
+mod color_map;
 mod error;
 mod flat;
+mod flow;
 mod label;
 mod page;
 mod picture;
@@ -24,6 +26,9 @@ mod view;
 
 pub use error::DrawError;
 pub use flat::{draw_flat, draw_polygons};
+pub use flow::{
+    FlowCells, FlowLine, FlowPicture, FlowStyle, FlowWell, draw_flow, draw_flow_slices,
+};
 pub use page::ReportPage;
 pub use picture::{Picture, PictureFormat};
 pub use slices::{draw_polyhedra, draw_slices};

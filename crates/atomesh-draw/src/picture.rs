@@ -29,6 +29,9 @@ pub(crate) enum Shape {
     Discs { centers: Vec<Place>, radius: f64, color: Color },
     /// Filled squares of one half side.
     Squares { centers: Vec<Place>, half: f64, color: Color },
+    /// Filled polygons of one colour; not `smooth`, they have no half-covered pixels, so that neighbours
+    /// leave no seam.
+    Polygons { polygons: Vec<Vec<Place>>, color: Color, smooth: bool },
 }
 
 impl Shape {
@@ -94,6 +97,7 @@ impl Picture {
             Shape::Image { .. } | Shape::Fill { .. } => 1,
             Shape::Lines { lines, .. } => lines.len(),
             Shape::Discs { centers, .. } | Shape::Squares { centers, .. } => centers.len(),
+            Shape::Polygons { polygons, .. } => polygons.len(),
         };
         self.shapes.iter().map(count).sum()
     }

@@ -74,12 +74,12 @@ fn draw(pixmap: &mut Pixmap, shape: &Shape) {
                 }
             }
         }
-        Shape::Discs { centers, radius, color } => fill(pixmap, *color, |path| {
+        Shape::Discs { centers, radius, color } => fill(pixmap, paint(*color), |path| {
             for c in centers {
                 path.push_circle(c[0] as f32, c[1] as f32, *radius as f32);
             }
         }),
-        Shape::Squares { centers, half, color } => fill(pixmap, *color, |path| {
+        Shape::Squares { centers, half, color } => fill(pixmap, paint(*color), |path| {
             for c in centers {
                 let [x, y] = c.map(|v| (v - half) as f32);
                 let side = 2.0 * *half as f32;
@@ -88,15 +88,33 @@ fn draw(pixmap: &mut Pixmap, shape: &Shape) {
                 }
             }
         }),
+        Shape::Polygons { polygons, color, smooth } => {
+            for some in polygons.chunks(LINES_PER_PATH / 8) {
+                let paint = Paint { anti_alias: *smooth, ..paint(*color) };
+                fill(pixmap, paint, |path| some.iter().for_each(|polygon| push(path, polygon)));
+            }
+        }
     }
 }
 
-fn fill(pixmap: &mut Pixmap, color: Color, build: impl Fn(&mut PathBuilder)) {
+/// Adds a polygon to a path.
+fn push(path: &mut PathBuilder, polygon: &[Place]) {
+    for (i, [x, y]) in polygon.iter().map(|p| p.map(|v| v as f32)).enumerate() {
+        if i == 0 {
+            path.move_to(x, y);
+        } else {
+            path.line_to(x, y);
+        }
+    }
+    path.close();
+}
+
+fn fill(pixmap: &mut Pixmap, paint: Paint, build: impl Fn(&mut PathBuilder)) {
     let mut path = PathBuilder::new();
     build(&mut path);
     if let Some(path) = path.finish() {
         let identity = Transform::identity();
-        pixmap.fill_path(&path, &paint(color), FillRule::Winding, identity, None);
+        pixmap.fill_path(&path, &paint, FillRule::Winding, identity, None);
     }
 }
 

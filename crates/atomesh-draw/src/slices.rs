@@ -13,25 +13,25 @@ use crate::view::view;
 use crate::{DrawError, Style};
 
 /// Pixels between panels.
-const GAP: f64 = 4.0;
+pub(crate) const GAP: f64 = 4.0;
 
 /// Half the side of an atom's square, in widths of an edge.
 const ATOM_HALF: f64 = 2.0;
 
 /// The colour of the lines where the other slices pass.
-const CROSS_HAIR: [u8; 3] = [230, 0, 0];
+pub(crate) const CROSS_HAIR: [u8; 3] = [230, 0, 0];
 
 /// A slice: its name, the axis it is normal to, and the axes drawn to the right and down.
-struct Plane {
-    name: &'static str,
-    normal: usize,
-    right: usize,
-    down: usize,
+pub(crate) struct Plane {
+    pub name: &'static str,
+    pub normal: usize,
+    pub right: usize,
+    pub down: usize,
 }
 
 /// The slices in the paper's places: X-Y upper right, Y-Z lower left, X-Z lower right, so that x is
 /// shared by the right panels and z by the lower ones.
-const PLANES: [(Plane, [usize; 2]); 3] = [
+pub(crate) const PLANES: [(Plane, [usize; 2]); 3] = [
     (Plane { name: "X-Y", normal: 2, right: 0, down: 1 }, [1, 0]),
     (Plane { name: "Y-Z", normal: 0, right: 1, down: 2 }, [0, 1]),
     (Plane { name: "X-Z", normal: 1, right: 0, down: 2 }, [1, 1]),
@@ -172,18 +172,8 @@ impl Panel<'_> {
 
     /// Where the plane cuts the faces of the cells, each line once, in pixels.
     fn cuts(&self) -> Vec<[Place; 2]> {
-        let mut lines: Vec<[[i64; 2]; 2]> =
-            (self.scene.mesh.cuts(self.plane.normal, self.level()).into_iter())
-                .map(|ends| {
-                    let [a, b] = ends.map(|p| self.place(&p).map(|v| (v * 100.0).round() as i64));
-                    [a.min(b), a.max(b)]
-                })
-                .filter(|[a, b]| a != b)
-                .collect();
-        // faces around an edge that lies in the plane share their cut
-        lines.sort_unstable();
-        lines.dedup();
-        lines.into_iter().map(|l| l.map(|p| p.map(|v| v as f64 / 100.0))).collect()
+        let cuts = self.scene.mesh.cuts(self.plane.normal, self.level()).into_iter();
+        unique(cuts.map(|ends| ends.map(|p| self.place(&p))))
     }
 
     fn level(&self) -> Level {
@@ -198,12 +188,25 @@ impl Panel<'_> {
     }
 }
 
+/// Lines to a hundredth of a pixel, each once and none without length, in order: faces around an edge that lies
+/// in a plane share their cut.
+pub(crate) fn unique(lines: impl Iterator<Item = [Place; 2]>) -> Vec<[Place; 2]> {
+    let rounded = lines.map(|ends| {
+        let [a, b] = ends.map(|p| p.map(|v| (v * 100.0).round() as i64));
+        [a.min(b), a.max(b)]
+    });
+    let mut lines: Vec<[[i64; 2]; 2]> = rounded.filter(|[a, b]| a != b).collect();
+    lines.sort_unstable();
+    lines.dedup();
+    lines.into_iter().map(|l| l.map(|p| p.map(|v| v as f64 / 100.0))).collect()
+}
+
 /// A plane at a constant coordinate. Points exactly on it count as one side, so that no face is cut in
 /// a corner: as above, except on the first plane, below which there is nothing.
 #[derive(Clone, Copy)]
-struct Level {
-    value: f64,
-    own_is_above: bool,
+pub(crate) struct Level {
+    pub value: f64,
+    pub own_is_above: bool,
 }
 
 impl Level {
@@ -212,7 +215,7 @@ impl Level {
     }
 
     /// The line in which the plane across axis `normal` cuts a convex polygon, if it does.
-    fn cut(self, normal: usize, corners: &[Point<3>]) -> Option<[Point<3>; 2]> {
+    pub fn cut(self, normal: usize, corners: &[Point<3>]) -> Option<[Point<3>; 2]> {
         let mut ends = (0..corners.len()).filter_map(|at| {
             let (p, q) = (corners[at], corners[(at + 1) % corners.len()]);
             if self.is_below(p[normal]) == self.is_below(q[normal]) {

@@ -68,6 +68,18 @@ fn draw(out: &mut String, shape: &Shape) -> Result<(), DrawError> {
         }
         Shape::Discs { centers, radius, color } => dots(out, centers, *radius, "round", *color),
         Shape::Squares { centers, half, color } => dots(out, centers, *half, "square", *color),
+        Shape::Polygons { polygons, color, smooth } => {
+            let color = hex(*color);
+            let edges = if *smooth { "" } else { " shape-rendering=\"crispEdges\"" };
+            let mut d = String::new();
+            for polygon in polygons {
+                for (i, corner) in polygon.iter().enumerate() {
+                    point(&mut d, if i == 0 { 'M' } else { 'L' }, *corner);
+                }
+                d.push('Z');
+            }
+            line(out, format_args!("<path fill=\"{color}\"{edges} d=\"{d}\"/>"));
+        }
     }
     Ok(())
 }

@@ -22,8 +22,8 @@ const MARGIN: f64 = 0.04;
 const BRIGHTNESS: f64 = 0.85;
 
 /// The colours behind the slices and of their outlines.
-const BACKGROUND: [u8; 3] = [58, 62, 72];
-const OUTLINE: [u8; 3] = [150, 150, 150];
+pub(crate) const BACKGROUND: [u8; 3] = [58, 62, 72];
+pub(crate) const OUTLINE: [u8; 3] = [150, 150, 150];
 
 /// The slices through sample `at`, fitted into `rect`.
 pub(crate) fn view(image: &Image<3>, at: [usize; 3], style: &Style, rect: Rect) -> Vec<Shape> {
@@ -59,14 +59,14 @@ enum Half {
 
 /// Where each axis points on the screen (right, down) and away from the eye.
 #[derive(Clone, Copy)]
-struct Camera {
+pub(crate) struct Camera {
     axes: [Place; 3],
-    away: Point<3>,
+    pub away: Point<3>,
 }
 
 impl Camera {
     /// z points down, or up; y then points toward the eye, or away, so that nothing is mirrored.
-    fn new(z_up: bool) -> Self {
+    pub fn new(z_up: bool) -> Self {
         let sign = if z_up { 1.0 } else { -1.0 };
         let ((sin, cos), (rise, run)) = (TURN.sin_cos(), ELEVATION.sin_cos());
         Self {
@@ -79,12 +79,12 @@ impl Camera {
         if self.away[axis] > 0.0 { [Half::High, Half::Low] } else { [Half::Low, Half::High] }
     }
 
-    fn project(&self, p: &Point<3>) -> Place {
+    pub fn project(&self, p: &Point<3>) -> Place {
         std::array::from_fn(|k| (0..3).map(|axis| p[axis] * self.axes[axis][k]).sum())
     }
 
     /// The scale and the shift that put a box of these sides into the middle of the rectangle.
-    fn fit(&self, sides: &Point<3>, rect: &Rect) -> (f64, Place) {
+    pub fn fit(&self, sides: &Point<3>, rect: &Rect) -> (f64, Place) {
         let corners = (0..8).map(|i| {
             let corner = std::array::from_fn(|k| if i >> k & 1 == 1 { sides[k] } else { 0.0 });
             self.project(&corner)

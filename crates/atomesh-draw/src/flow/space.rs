@@ -1,0 +1,155 @@
+//! Flow as it is seen from above: the box, barriers, streamlines and wells.
+//!
+//! A parallel projection, that of the slices in space; pieces are painted from the farthest to the nearest.
+
+use atomesh::geometry::{Point, difference, dot};
+
+use super::sheet::{Looks, Mark, mark_shapes};
+use super::slices::Scene;
+use crate::Color;
+use crate::color_map::PLASMA;
+use crate::picture::{Place, Rect, Shape};
+use crate::view::{BACKGROUND, Camera, OUTLINE, view};
+
+/// The width of streamlines in pixels.
+const LINE: f64 = 1.6;
+
+/// The greys of barriers seen edge-on and from the front.
+const BARRIER: [f64; 2] = [110.0, 225.0];
+
+/// The panel: barriers, streamlines and wells; the slices of the image if there are none.
+pub(super) fn in_space(scene: &Scene, looks: &Looks, rect: Rect) -> Vec<Shape> {
+    let flow = scene.flow;
+    let is_empty = flow.barriers.is_empty() && flow.lines.is_empty() && flow.wells.is_empty();
+    if let (Some(image), true) = (flow.image, is_empty) {
+        let shape = image.frame().shape();
+        let at = std::array::from_fn(|k| (scene.at[k].round().max(0.0) as usize).min(shape[k] - 1));
+        return view(image, at, scene.style, rect);
+    }
+    let eye = Eye::new(scene, &rect);
+    let mut shapes = vec![Shape::Fill { rect, color: BACKGROUND }];
+    let [behind, before] = eye.frame();
+    shapes.push(Shape::Lines { lines: behind, width: 1.0, color: OUTLINE });
+    let mut pieces: Vec<(f64, Color, Piece)> = Vec::new();
+    for &facet in flow.barriers {
+        let corners = scene.corners(&scene.facets[facet as usize]);
+        let (depth, _) = eye.depth(&corners);
+        let places = corners.iter().map(|p| eye.place(p)).collect();
+        pieces.push((depth, eye.shade(&corners), Piece::Facet(places)));
+    }
+    if let Some(range) = looks.time {
+        for line in flow.lines {
+            for (ends, times) in line.points.windows(2).zip(line.times.windows(2)) {
+                let color = PLASMA.at(range.share(0.5 * (times[0] + times[1])));
+                let places = [eye.place(&ends[0]), eye.place(&ends[1])];
+                pieces.push((eye.depth(ends).0, color, Piece::Line(places)));
+            }
+        }
+    }
+    pieces.sort_by(|a, b| b.0.total_cmp(&a.0));
+    shapes.extend(painted(pieces));
+    shapes.push(Shape::Lines { lines: before, width: 1.0, color: OUTLINE });
+    let marks = flow.wells.iter().map(|well| Mark {
+        place: eye.place(&well.place),
+        is_source: well.rate > 0.0,
+        is_near: true,
+    });
+    shapes.extend(marks.flat_map(|mark| mark_shapes(&mark, &rect)));
+    shapes
+}
+
+/// Something to paint.
+enum Piece {
+    Facet(Vec<Place>),
+    Line([Place; 2]),
+}
+
+/// Shapes of pieces in their order, those of one kind and colour that follow each other in one.
+fn painted(pieces: Vec<(f64, Color, Piece)>) -> Vec<Shape> {
+    let mut shapes: Vec<Shape> = Vec::new();
+    for (_, own, piece) in pieces {
+        match (piece, shapes.last_mut()) {
+            (Piece::Line(line), Some(Shape::Lines { lines, color, .. })) if *color == own => {
+                lines.push(line);
+            }
+            (Piece::Facet(facet), Some(Shape::Polygons { polygons, color, .. }))
+                if *color == own =>
+            {
+                polygons.push(facet);
+            }
+            (Piece::Line(line), _) => {
+                shapes.push(Shape::Lines { lines: vec![line], width: LINE, color: own });
+            }
+            (Piece::Facet(facet), _) => {
+                shapes.push(Shape::Polygons { polygons: vec![facet], color: own, smooth: false });
+            }
+        }
+    }
+    shapes
+}
+
+/// The eye, and how far what it sees is shrunk and shifted to fit into the panel.
+struct Eye<'a> {
+    scene: &'a Scene<'a>,
+    camera: Camera,
+    fit: (f64, Place),
+}
+
+impl<'a> Eye<'a> {
+    fn new(scene: &'a Scene<'a>, rect: &Rect) -> Self {
+        let camera = Camera::new(scene.style.z_up);
+        let fit = camera.fit(&scene.in_pixels(&scene.extent), rect);
+        Self { scene, camera, fit }
+    }
+
+    /// The point in pixels of the box, from its least corner on.
+    fn in_box(&self, p: &Point<3>) -> Point<3> {
+        self.scene.in_pixels(&difference(p, &self.scene.first))
+    }
+
+    fn place(&self, p: &Point<3>) -> Place {
+        let (scale, shift) = self.fit;
+        let flat = self.camera.project(&self.in_box(p));
+        std::array::from_fn(|k| shift[k] + scale * flat[k])
+    }
+
+    /// How far away the middle of some points is, and the middle.
+    fn depth(&self, points: &[Point<3>]) -> (f64, Point<3>) {
+        let mean = |k: usize| points.iter().map(|p| p[k]).sum::<f64>() / points.len() as f64;
+        let middle = std::array::from_fn(mean);
+        (dot(&self.in_box(&middle), &self.camera.away), middle)
+    }
+
+    /// The grey of a facet, lighter the more it faces the eye.
+    fn shade(&self, corners: &[Point<3>]) -> Color {
+        let [a, b, c] = [0, 1, 2].map(|i| self.in_box(&corners[i]));
+        let (u, v) = (difference(&b, &a), difference(&c, &a));
+        let normal: Point<3> = std::array::from_fn(|k| {
+            let (i, j) = ((k + 1) % 3, (k + 2) % 3);
+            u[i] * v[j] - u[j] * v[i]
+        });
+        let size = dot(&normal, &normal).sqrt();
+        let share = if size > 0.0 { dot(&normal, &self.camera.away).abs() / size } else { 0.0 };
+        let [least, most] = BARRIER;
+        [(least + share * (most - least)).round() as u8; 3]
+    }
+
+    /// The edges of the box: those that its inside hides nothing of, and those in front.
+    fn frame(&self) -> [Vec<[Place; 2]>; 2] {
+        let Scene { first, extent, .. } = self.scene;
+        let corner = |at: usize| -> Point<3> {
+            std::array::from_fn(|k| first[k] + extent[k] * (at >> k & 1) as f64)
+        };
+        let nearest =
+            (0..3).fold(0, |at, k| if self.camera.away[k] < 0.0 { at | 1 << k } else { at });
+        let mut edges = [Vec::new(), Vec::new()];
+        for at in 0..8_usize {
+            for other in (0..3).map(|k| at | 1 << k).filter(|other| *other != at) {
+                let is_before = at == nearest || other == nearest;
+                let ends = [corner(at), corner(other)];
+                edges[usize::from(is_before)].push(ends.map(|p| self.place(&p)));
+            }
+        }
+        edges
+    }
+}
