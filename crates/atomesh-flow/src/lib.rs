@@ -22,6 +22,8 @@ mod solution;
 pub mod solve;
 pub mod streamlines;
 pub mod two_point;
+#[cfg(test)]
+pub(crate) mod test_meshes;
 
 pub use error::FlowError;
 pub use grid::{FacetSet, FlowFacet, Grid};
