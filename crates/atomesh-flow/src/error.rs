@@ -118,6 +118,17 @@ pub enum FlowError {
         /// The highest order that there is.
         most: usize,
     },
+    /// A penalty below the bound from which the equations are proven to be stable.
+    #[error("the penalty factor is {value}; expected a finite number, 1 or more")]
+    Penalty {
+        /// The factor found.
+        value: f64,
+    },
+    /// Discontinuous Galerkin on cells that are no simplices.
+    #[error(
+        "the discontinuous Galerkin scheme has no functions on Voronoi cells; expected triangles or tetrahedra"
+    )]
+    NotSimplices,
     /// The linear equations were not solved.
     #[error(transparent)]
     Solve(#[from] SolveError),

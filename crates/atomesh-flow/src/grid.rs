@@ -173,6 +173,11 @@ impl<const D: usize> Grid<D> {
         &self.facets
     }
 
+    /// The corners of a facet, ascending; `None` of Voronoi cells.
+    pub fn facet_corners(&self, facet: usize) -> Option<&[u32; D]> {
+        self.corners.get(facet)
+    }
+
     /// The facets with names.
     pub fn sets(&self) -> &[FacetSet] {
         &self.sets

@@ -1,0 +1,209 @@
+//! How pressures beside a facet make the flux through it.
+//!
+//! With n out of the first cell, the jump `[p] = p₁ − p₂` and the weighted mean `g = {k ∂p/∂n}`, the flux is
+//! `F = b [p] − a g`, and the equations hold the terms
+//!
+//! ```text
+//! F(p) [v] ∓ a ([p] + ε g(p)) g(v)        − symmetric, + Oden, Babuška & Baumann
+//! ```
+//!
+//! in which ε is the resistance of a barrier, across which `[p] = −ε g`; 0 where there is none. Both are then consistent
+//! if `a + b ε = 1`. With s the inverse of the penalty σ:
+//!
+//! - symmetric: `a = s/(ε + s)`, `b = 1/(ε + s)` (Juntunen & Stenberg 2009), which is the interior penalty at ε = 0
+//!   (`a = 1`, `b = σ`) and no flow at ε = ∞, and is as stable for any ε between;
+//! - Oden, Babuška & Baumann: `b = ε/(ε + s)²`, `a = 1 − bε`, which is theirs at ε = 0 (`a = 1`, `b = 0`) and no flow at
+//!   ε = ∞. The terms with a cancel in the energy, but for `a ε g²`, and b is never below 0.
+//!
+//! The mean is weighted by the permeability of the other side, so that the penalty is by the harmonic mean of the
+//! two (Ern, Stephansen & Zunino 2009), and σ is such that the energy stays above 0, by the sharp inequality
+//! between a polynomial of degree p − 1 in a cell, such as its slope, and on a facet (Warburton & Hesthaven 2003):
+//! `‖w‖²_F ≤ p (p + D − 1)/D · |F|/|K| ‖w‖²_K`. Each of the D + 1 facets may take as much of a cell's energy.
+
+use atomesh::geometry::{Point, difference, dot};
+
+use super::element::{Affine, Element};
+use super::{DgOptions, Form};
+use crate::grid::Grid;
+use crate::permeability::Tensor;
+use crate::problem::Condition;
+use crate::setting::Setting;
+
+/// One cell beside a facet.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct Side<const D: usize> {
+    /// The cell.
+    pub cell: u32,
+    /// Its functions at the facet's nodes.
+    pub trace: u32,
+    /// The direction, in the cell's ξ, along which the slope of p is the side's part of g.
+    pub direction: Point<D>,
+    /// +1 for the first side, −1 for the second: p's part of the jump.
+    pub sign: f64,
+}
+
+/// A facet through which something flows because of pressures.
+#[derive(Clone, Debug)]
+pub(super) struct Interface<const D: usize> {
+    /// The facet's area, or length.
+    pub measure: f64,
+    /// a.
+    pub slope_weight: f64,
+    /// b.
+    pub jump_weight: f64,
+    /// ε.
+    pub resistance: f64,
+    /// −1 in the symmetric form, +1 in Oden, Babuška & Baumann's.
+    pub sign: f64,
+    first: Side<D>,
+    second: Option<Side<D>>,
+}
+
+impl<const D: usize> Interface<D> {
+    /// The cells beside it: one on the boundary.
+    #[inline]
+    pub fn sides(&self) -> impl Iterator<Item = &Side<D>> {
+        std::iter::once(&self.first).chain(&self.second)
+    }
+
+    /// The side of a cell.
+    #[inline]
+    pub fn side_of(&self, cell: u32) -> &Side<D> {
+        self.second.as_ref().filter(|side| side.cell == cell).unwrap_or(&self.first)
+    }
+}
+
+/// What is known of one side before the two are weighed.
+struct Flank<const D: usize> {
+    cell: u32,
+    trace: u32,
+    /// k n in ξ.
+    direction: Point<D>,
+    /// n·k n.
+    permeability: f64,
+    /// The centroid's distance from the facet.
+    distance: f64,
+    /// What the penalty must be, were the weight 1.
+    penalty: f64,
+}
+
+/// Makes the interface of a facet; `None` where nothing flows because of pressures: sealed facets and those of the
+/// boundary on which the pressure is not given.
+pub(super) fn interface<const D: usize>(
+    grid: &Grid<D>,
+    setting: &Setting<'_, D>,
+    cells: &[Affine<D>],
+    options: &DgOptions,
+    number: usize,
+) -> Option<Interface<D>> {
+    let facet = &grid.facets()[number];
+    let multiplier = setting.multipliers()[number];
+    let condition = setting.condition(number);
+    let is_open = match facet.neighbour {
+        Some(_) => multiplier > 0.0,
+        None => matches!(condition, Some(Condition::Pressure(_))),
+    };
+    if !is_open {
+        return None;
+    }
+    let flank = |cell: u32| flank(grid, setting, &cells[cell as usize], options, (number, cell));
+    let first = flank(facet.cell);
+    let second = facet.neighbour.map(flank);
+    let other = second.as_ref().map_or(0.0, |side| side.permeability);
+    let sum = first.permeability + other;
+    // the first side's weight: 1 on the boundary
+    let weight = if second.is_some() { other / sum } else { 1.0 };
+    let side = |flank: &Flank<D>, weight: f64, sign: f64| Side {
+        cell: flank.cell,
+        trace: flank.trace,
+        direction: flank.direction.map(|x| weight * x),
+        sign,
+    };
+    let penalty = |flank: &Flank<D>, weight: f64| weight * weight * flank.penalty;
+    let mut sigma = penalty(&first, weight);
+    let mut resistance = first.distance / first.permeability;
+    if let Some(second) = &second {
+        sigma += penalty(second, 1.0 - weight);
+        resistance += second.distance / second.permeability;
+    }
+    resistance *= 1.0 / multiplier - 1.0;
+    let (slope_weight, jump_weight) = weights(options.form, 1.0 / sigma, resistance);
+    Some(Interface {
+        measure: facet.measure(),
+        slope_weight,
+        jump_weight,
+        resistance,
+        sign: if options.form == Form::InteriorPenalty { -1.0 } else { 1.0 },
+        first: side(&first, weight, 1.0),
+        second: second.map(|second| side(&second, 1.0 - weight, -1.0)),
+    })
+}
+
+/// a and b.
+fn weights(form: Form, s: f64, resistance: f64) -> (f64, f64) {
+    let sum = resistance + s;
+    match form {
+        Form::InteriorPenalty => (s / sum, 1.0 / sum),
+        // 1 − ε²/(ε + s)², without the difference of what is nearly equal
+        Form::OdenBabuskaBaumann => {
+            (s * (2.0 * resistance + s) / (sum * sum), resistance / (sum * sum))
+        }
+    }
+}
+
+fn flank<const D: usize>(
+    grid: &Grid<D>,
+    setting: &Setting<'_, D>,
+    affine: &Affine<D>,
+    options: &DgOptions,
+    (facet, cell): (usize, u32),
+) -> Flank<D> {
+    let measure = grid.facets()[facet].measure();
+    let normal = grid.facets()[facet].area.map(|x| x / measure);
+    let flow = product(&setting.permeability().tensor(cell as usize), &normal);
+    let permeability = dot(&normal, &flow);
+    let away = difference(&grid.facets()[facet].centroid, &affine.centroid);
+    let (order, dimension) = (options.order as f64, D as f64);
+    let trace_bound =
+        order * (order + dimension - 1.0) / dimension * measure / grid.measures()[cell as usize];
+    Flank {
+        cell,
+        trace: trace_of(grid, facet, cell),
+        direction: affine.gradients.map(|gradient| dot(&gradient, &flow)),
+        permeability,
+        distance: dot(&away, &normal).abs(),
+        penalty: options.penalty * (dimension + 1.0) * trace_bound * permeability,
+    }
+}
+
+/// The number of a cell's trace on a facet.
+pub(super) fn trace_of<const D: usize>(grid: &Grid<D>, facet: usize, cell: u32) -> u32 {
+    let mesh = grid.mesh().expect("checked before");
+    let own = &mesh.corners()[cell as usize * (D + 1)..(cell as usize + 1) * (D + 1)];
+    let facet = grid.facet_corners(facet).expect("facets of a mesh have corners");
+    let place = |corner| own.iter().position(|c| *c == corner).expect("the cell has the facet");
+    Element::<D>::trace_number(&facet.map(place)) as u32
+}
+
+/// The product of a tensor and a vector.
+pub(super) fn product<const D: usize>(tensor: &Tensor<D>, vector: &Point<D>) -> Point<D> {
+    tensor.map(|row| dot(&row, vector))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn weights_are_consistent_at_any_resistance() {
+        for form in [Form::InteriorPenalty, Form::OdenBabuskaBaumann] {
+            for resistance in [0.0, 1e-9, 0.5, 1.0, 1e9] {
+                let (a, b) = weights(form, 0.3, resistance);
+                assert!((a + b * resistance - 1.0).abs() < 1e-14, "{form:?} {resistance}");
+                assert!(b >= 0.0);
+            }
+        }
+        assert_eq!(weights(Form::OdenBabuskaBaumann, 0.3, 0.0), (1.0, 0.0));
+        assert_eq!(weights(Form::InteriorPenalty, 0.25, 0.0), (1.0, 4.0));
+    }
+}
