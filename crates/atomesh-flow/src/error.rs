@@ -33,6 +33,18 @@ pub enum FlowError {
          for each cell, or triangles or tetrahedra, which the discontinuous Galerkin scheme takes"
     )]
     Tensor,
+    /// A face between two Voronoi cells that does not stand at a right angle to the line between their sites.
+    #[error(
+        "the normal of the face between cells {} and {} and the line between their sites have the cosine {cosine}; \
+         expected 1, as in Voronoi cells that no frame has stretched or sheared",
+        .cells[0], .cells[1]
+    )]
+    Skewed {
+        /// The cells.
+        cells: [u32; 2],
+        /// The cosine of the angle.
+        cosine: f64,
+    },
     /// No facets of that name.
     #[error("no facets are named {name:?}; known are {known}")]
     Group {

@@ -106,6 +106,14 @@ impl<'a, const D: usize> Setting<'a, D> {
         Some(self.problem.boundaries[number as usize].condition)
     }
 
+    /// The number in the problem of the condition on a facet of the boundary.
+    ///
+    /// # Panics
+    /// If there is none.
+    pub(crate) fn boundary(&self, facet: usize) -> u32 {
+        self.conditions[facet].expect("a condition holds on the facet")
+    }
+
     /// The wells with their cells, in the problem's order.
     pub fn wells(&self) -> &[PlacedWell] {
         &self.wells

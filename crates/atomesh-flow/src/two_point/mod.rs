@@ -1,1 +1,63 @@
-//! Two-point flux on Voronoi cells.
+//! Two-point flux on Voronoi cells: one pressure a cell, at its site, and through each face a flux in proportion to
+//! the difference of the two pressures beside it.
+//!
+//! Faces of Voronoi cells stand at right angles to the lines between sites, so that for isotropic permeability the
+//! flux of a linear pressure is exact, whatever the cells look like (Heinrich 1987; PEBI cells: Heinemann et al.
+//! 1991). In order:
+//!
+//! 1. `transmissibility`: of each face between two cells, with k on either side and the multiplier of a barrier;
+//! 2. `boundary`: what holds on faces on sides of the box. A site on a side *is* the boundary: where the pressure is
+//!    given there it is no unknown;
+//! 3. `well`: the radius at which a well's pressure is that of its cell;
+//! 4. `equations`: one row for each unknown cell, symmetric and positive definite; fluxes from the answer.
+//!
+//! Mass is conserved in each cell to the residual of the equations. The error of pressures is of order 2 in the
+//! distance of sites on lattices, of order 1 at least on any.
+
+mod boundary;
+mod equations;
+#[cfg(test)]
+mod tests;
+mod transmissibility;
+mod well;
+
+pub use transmissibility::transmissibilities;
+pub use well::{RINGS, equivalent_radius};
+
+use atomesh::voronoi::PolyMesh;
+use atomesh::watch::{Phase, Watch, check};
+
+use crate::error::FlowError;
+use crate::grid::Grid;
+use crate::setting::Setting;
+use crate::solution::Solution;
+use crate::solve::SolveOptions;
+
+/// Steady flow on Voronoi cells. `grid` is [`Grid::of_cells`] of `cells`, with any sets added, and `setting` is of
+/// that grid. Pressures are those at the sites.
+///
+/// Cost: that of solving one equation a cell. Reports [`Phase::Assemble`] and [`Phase::Solve`] to `watch`.
+///
+/// # Errors
+/// [`FlowError::Tensor`] if the permeability is one, [`FlowError::Skewed`] if a face does not stand at a right angle
+/// to the line between its sites, [`FlowError::WellRadius`] if a well of given pressure has no radius or one that is
+/// too large, and what [`solve`](crate::solve::solve()) says.
+///
+/// # Panics
+/// If the grid is not of these cells.
+pub fn solve<const D: usize>(
+    cells: &PolyMesh<D>,
+    grid: &Grid<D>,
+    setting: &Setting<'_, D>,
+    options: &SolveOptions,
+    watch: &mut dyn Watch,
+) -> Result<Solution<D>, FlowError> {
+    assert_eq!(grid.facets().len(), cells.face_count(), "the grid is of these cells");
+    check(watch, Phase::Assemble, 0.0, None)?;
+    let inner = transmissibilities(cells, setting.permeability(), setting.multipliers())?;
+    let sides = boundary::sides(cells, grid, setting);
+    let wells = well::couple(cells, setting)?;
+    let equations = equations::Equations::new(grid, setting, inner, sides, wells);
+    let (pressures, report) = equations.solve(cells.sites(), options, watch)?;
+    Ok(equations.solution(pressures, report))
+}
