@@ -1,14 +1,45 @@
 //! Sparse linear equations: direct where that is fast, preconditioned iteration beyond.
 //!
 //! The unknowns come in blocks of one size, those of a cell, and each block has a place, by which the direct solver
-//! orders them (nested dissection, George 1973).
+//! orders them (nested dissection, George 1973). Symmetric equations are solved by a Cholesky factor or conjugate
+//! gradients, others by LU or BiCGSTAB. Iteration is preconditioned by algebraic multigrid where a block is one
+//! unknown, by sweeps over blocks and a correction in the coarse space where it is more. Whatever the way, the
+//! residual is computed from the answer, and one that is large is an error.
 
+mod aggregate;
+mod blocks;
+mod direct;
+mod krylov;
+mod multigrid;
+mod order;
 mod sparse;
+mod two_level;
+#[cfg(test)]
+mod tests;
+mod vector;
 
+pub use order::Elimination;
 pub use sparse::Sparse;
 
+use std::borrow::Cow;
+
 use atomesh::geometry::Point;
-use atomesh::watch::{Cancelled, Watch};
+use atomesh::watch::{Cancelled, Phase, Watch, check};
+
+use direct::Factors;
+use krylov::{Goal, Preconditioner, bicgstab, conjugate_gradients};
+use multigrid::Multigrid;
+use two_level::TwoLevel;
+use vector::norm;
+
+/// A larger residual is no answer, whatever the reason.
+const ACCEPTED: f64 = 1e-8;
+/// Multiplications that factors of equations in space may take before iteration is tried first.
+const WORK: f64 = 2e10;
+/// Equations in space beyond which factors are not even counted.
+const MOST_IN_SPACE: usize = 100_000;
+/// Steps of refinement after a direct solution.
+const REFINEMENTS: usize = 3;
 
 /// Equations to solve.
 #[derive(Clone, Copy, Debug)]
@@ -66,11 +97,13 @@ pub struct SolveOptions {
     pub tolerance: f64,
     /// Iteration fails after so many. Default 2000.
     pub limit: usize,
+    /// The most bytes that factors may take. Default 8 GiB.
+    pub memory: u64,
 }
 
 impl Default for SolveOptions {
     fn default() -> Self {
-        Self { method: Method::Auto, tolerance: 1e-12, limit: 2000 }
+        Self { method: Method::Auto, tolerance: 1e-12, limit: 2000, memory: 8 << 30 }
     }
 }
 
@@ -108,6 +141,14 @@ pub enum SolveError {
         /// The residual asked for.
         tolerance: f64,
     },
+    /// An equation holds a value that is not finite.
+    #[error("equation {equation} holds {value}; expected finite numbers")]
+    NotFinite {
+        /// The row.
+        equation: usize,
+        /// The value.
+        value: f64,
+    },
     /// The watch ended the work.
     #[error(transparent)]
     Cancelled(#[from] Cancelled),
@@ -115,29 +156,140 @@ pub enum SolveError {
 
 /// Solves the equations; the same bits at any number of threads.
 ///
+/// [`Method::Auto`] takes factors in the plane, and in space while they take little work, as long as they fit into
+/// memory; and whichever way it takes first, the other if that fails.
+///
 /// # Errors
 /// [`SolveError`].
+///
+/// # Panics
+/// If the matrix is not square, or right-hand side, places or coarse space do not fit it.
 pub fn solve<const D: usize>(
     system: &System<'_, D>,
-    _options: &SolveOptions,
-    _watch: &mut dyn Watch,
+    options: &SolveOptions,
+    watch: &mut dyn Watch,
 ) -> Result<(Vec<f64>, SolveReport), SolveError> {
-    use faer::prelude::Solve;
-    let n = system.rhs.len();
-    let triplets: Vec<_> =
-        system.matrix.entries().map(|(i, j, v)| faer::sparse::Triplet::new(i, j, v)).collect();
-    let matrix = faer::sparse::SparseColMat::<usize, f64>::try_new_from_triplets(n, n, &triplets)
-        .expect("entries are within the matrix");
-    let rhs = faer::Col::from_fn(n, |i| system.rhs[i]);
-    let factors = matrix.sp_lu().map_err(|_| SolveError::Singular { unknowns: n, at: 0 })?;
-    let x = factors.solve(&rhs);
-    let x: Vec<f64> = (0..n).map(|i| x[i]).collect();
-    let report = SolveReport {
-        method: "LU",
-        unknowns: n,
-        nonzeros: triplets.len(),
-        iterations: 0,
-        residual: 0.0,
+    system.check()?;
+    check(watch, Phase::Solve, 0.0, None)?;
+    if system.rhs.iter().all(|&b| b == 0.0) {
+        let x = vec![0.0; system.rhs.len()];
+        return Ok((x, system.report("none: nothing flows", 0, 0.0)));
+    }
+    let order = || {
+        let limit = options.memory as f64 / 8.0;
+        Elimination::new(system.matrix, system.block, system.places, limit)
     };
-    Ok((x, report))
+    match options.method {
+        Method::Direct => direct(system, &order(), options, watch),
+        Method::Iterative => iterate(system, options, watch),
+        Method::Auto => {
+            let order = system.may_be_direct().then(order).filter(|order| {
+                (D == 2 || order.work <= WORK)
+                    && Factors::bytes(order, system.is_symmetric) <= options.memory as f64
+            });
+            match order {
+                Some(order) => {
+                    direct(system, &order, options, watch).or_else(|error| match error {
+                        SolveError::Memory { .. } => iterate(system, options, watch),
+                        other => Err(other),
+                    })
+                }
+                None => iterate(system, options, watch),
+            }
+        }
+    }
+}
+
+impl<const D: usize> System<'_, D> {
+    fn check(&self) -> Result<(), SolveError> {
+        let count = self.rhs.len();
+        assert_eq!(self.matrix.row_count(), count, "a right-hand side for each row");
+        assert_eq!(self.matrix.column_count(), count, "a square matrix");
+        assert_eq!(self.places.len() * self.block, count, "a place for each block");
+        let fits = self.coarse.is_none_or(|coarse| coarse.row_count() == count);
+        assert!(fits, "a row of the coarse space for each unknown");
+        for equation in 0..count {
+            let values = self.matrix.row(equation).1.iter().chain(&self.rhs[equation..=equation]);
+            if let Some(&value) = values.clone().find(|value| !value.is_finite()) {
+                return Err(SolveError::NotFinite { equation, value });
+            }
+        }
+        Ok(())
+    }
+
+    fn may_be_direct(&self) -> bool {
+        D == 2 || self.rhs.len() <= MOST_IN_SPACE
+    }
+
+    fn report(&self, method: &'static str, iterations: usize, residual: f64) -> SolveReport {
+        let (unknowns, nonzeros) = (self.rhs.len(), self.matrix.entry_count());
+        SolveReport { method, unknowns, nonzeros, iterations, residual }
+    }
+
+    /// ‖b − Ax‖ / ‖b‖, with b − Ax.
+    fn residual(&self, x: &[f64]) -> (f64, Vec<f64>) {
+        let mut residual = vec![0.0; x.len()];
+        self.matrix.residual(self.rhs, x, &mut residual);
+        (norm(&residual) / norm(self.rhs), residual)
+    }
+}
+
+fn direct<const D: usize>(
+    system: &System<'_, D>,
+    order: &Elimination,
+    options: &SolveOptions,
+    watch: &mut dyn Watch,
+) -> Result<(Vec<f64>, SolveReport), SolveError> {
+    check(watch, Phase::Solve, 0.1, None)?;
+    let mut factors = Factors::new(system.matrix, order, system.is_symmetric, options.memory)?;
+    check(watch, Phase::Solve, 0.9, None)?;
+    let mut x = system.rhs.to_vec();
+    factors.solve(&mut x);
+    let (mut residual, mut rest) = system.residual(&x);
+    for _ in 0..REFINEMENTS {
+        if residual <= options.tolerance || !residual.is_finite() {
+            break;
+        }
+        factors.solve(&mut rest);
+        let better: Vec<f64> = x.iter().zip(&rest).map(|(x, change)| x + change).collect();
+        let (next, left) = system.residual(&better);
+        if next >= residual || next.is_nan() {
+            break;
+        }
+        (x, residual, rest) = (better, next, left);
+    }
+    if residual <= ACCEPTED {
+        return Ok((x, system.report(factors.name(), 0, residual)));
+    }
+    let worst = |a: &usize, b: &usize| rest[*a].abs().total_cmp(&rest[*b].abs());
+    let at = (0..rest.len()).max_by(worst).unwrap_or(0);
+    Err(SolveError::Singular { unknowns: rest.len(), at })
+}
+
+fn iterate<const D: usize>(
+    system: &System<'_, D>,
+    options: &SolveOptions,
+    watch: &mut dyn Watch,
+) -> Result<(Vec<f64>, SolveReport), SolveError> {
+    let scalar = system.block == 1 && system.coarse.is_none();
+    let mut inverse: Box<dyn Preconditioner + '_> = if scalar {
+        let matrix = Cow::Borrowed(system.matrix);
+        Box::new(Multigrid::new(matrix, system.places, system.is_symmetric))
+    } else {
+        Box::new(TwoLevel::new(system)?)
+    };
+    let goal = Goal { tolerance: options.tolerance, limit: options.limit };
+    let (run, method) = match (system.is_symmetric, scalar) {
+        (true, true) => (conjugate_gradients as krylov::Solver, "conjugate gradients, multigrid"),
+        (true, false) => (conjugate_gradients as krylov::Solver, "conjugate gradients, two levels"),
+        (false, true) => (bicgstab as krylov::Solver, "BiCGSTAB, multigrid"),
+        (false, false) => (bicgstab as krylov::Solver, "BiCGSTAB, two levels"),
+    };
+    let found = run(system.matrix, system.rhs, &mut *inverse, goal, watch)?;
+    let (residual, _) = system.residual(&found.x);
+    if residual <= options.tolerance.max(ACCEPTED) {
+        return Ok((found.x, system.report(method, found.iterations, residual)));
+    }
+    let (iterations, tolerance) = (found.iterations, options.tolerance);
+    Err(SolveError::NotConverged { method, iterations, residual, tolerance })
 }
