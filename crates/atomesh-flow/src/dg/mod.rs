@@ -96,7 +96,7 @@ pub struct DgOptions {
     /// The degree p of the polynomials: 1 to 3, with Oden, Babuška and Baumann's form 2 or 3. Default 2.
     pub order: usize,
     /// The penalty over the least that is proven to be stable, on any mesh and with any permeability; 1 or more.
-    /// Default 1.
+    /// Default 1.5: of 1, 1.5, 2 and 4 the one with the least error in the jump across a slit, at every order.
     pub penalty: f64,
     /// How the equations are solved.
     pub solve: SolveOptions,

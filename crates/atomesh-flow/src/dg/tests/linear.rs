@@ -13,7 +13,7 @@ use crate::problem::{Boundary, Condition, Problem, Value};
 use crate::test_meshes::unit_box;
 
 /// A symmetric tensor with principal values of some 0.01 to 100: A Aᵀ + 0.01.
-fn random_tensor<const D: usize>(seed: u64) -> Tensor<D> {
+pub(super) fn random_tensor<const D: usize>(seed: u64) -> Tensor<D> {
     let mut random = Pcg64::seed_from_u64(seed);
     let a: Tensor<D> =
         std::array::from_fn(|_| std::array::from_fn(|_| 5.0 * random.random_range(-1.0..1.0)));
