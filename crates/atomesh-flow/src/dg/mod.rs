@@ -104,7 +104,7 @@ pub struct DgOptions {
 
 impl Default for DgOptions {
     fn default() -> Self {
-        Self { form: Form::InteriorPenalty, order: 2, penalty: 1.0, solve: SolveOptions::default() }
+        Self { form: Form::InteriorPenalty, order: 2, penalty: 1.5, solve: SolveOptions::default() }
     }
 }
 

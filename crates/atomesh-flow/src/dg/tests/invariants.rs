@@ -2,7 +2,7 @@
 
 use atomesh::geometry::{Bounds, Point};
 use atomesh::mesh::{Delaunay, Mesh};
-use atomesh::voronoi::{PolyMesh, SiteMoves};
+use atomesh::voronoi::voronoi;
 use atomesh::watch::Silent;
 
 use super::super::*;
@@ -42,28 +42,34 @@ fn matrix<const D: usize>(grid: &Grid<D>, setting: &Setting<'_, D>, options: &Dg
     assemble::matrix(&scheme, &mut Silent).unwrap()
 }
 
+/// The least eigenvalue of a symmetric matrix over the largest entry.
+fn least_eigenvalue(matrix: &Sparse) -> f64 {
+    let n = matrix.row_count();
+    let mut dense = faer::Mat::<f64>::zeros(n, n);
+    for (row, column, value) in matrix.entries() {
+        dense[(row, column)] = value;
+    }
+    let largest = matrix.entries().fold(0.0_f64, |most, entry| most.max(entry.2.abs()));
+    for (row, column, value) in matrix.entries() {
+        assert!((value - dense[(column, row)]).abs() <= 1e-14 * largest, "{row} {column}");
+    }
+    let values = dense.self_adjoint_eigenvalues(faer::Side::Lower).unwrap();
+    values.iter().copied().fold(f64::INFINITY, f64::min) / largest
+}
+
 fn is_symmetric_and_definite<const D: usize>(delaunay: Delaunay<D>, orders: &[usize]) {
     let mut grid = unit_box(delaunay, 3, 0.3, 2);
     let problem = everything(&mut grid);
     let setting = Setting::new(&problem, &grid).unwrap();
     for &order in orders {
-        // at the bound itself
-        let options = DgOptions { order, penalty: 1.0, ..DgOptions::default() };
-        let matrix = matrix(&grid, &setting, &options);
-        let n = matrix.row_count();
-        let mut dense = faer::Mat::<f64>::zeros(n, n);
-        for (row, column, value) in matrix.entries() {
-            dense[(row, column)] = value;
-        }
-        let largest = matrix.entries().fold(0.0_f64, |most, entry| most.max(entry.2.abs()));
-        for (row, column, value) in matrix.entries() {
-            let away = (value - dense[(column, row)]).abs();
-            assert!(away <= 1e-14 * largest, "{D}-D {order}: {row} {column} {away:e}");
-        }
-        let values = dense.self_adjoint_eigenvalues(faer::Side::Lower).unwrap();
-        let least = values.iter().copied().fold(f64::INFINITY, f64::min);
-        // eigenvalues are known to rounding of the largest
-        assert!(least > 1e-12 * largest, "{D}-D {order}: {least:e} {largest:e}");
+        let least = |penalty: f64| {
+            let options = DgOptions { order, penalty, ..DgOptions::default() };
+            least_eigenvalue(&matrix(&grid, &setting, &options))
+        };
+        // at the bound itself; eigenvalues are known to rounding of the largest
+        assert!(least(1.0) > 1e-12, "{D}-D {order}: {:e}", least(1.0));
+        // and the bound is none too far: a sixth of it, which options do not allow, is too little
+        assert!(least(1.0 / 6.0) < -1e-9, "{D}-D {order}: {:e}", least(1.0 / 6.0));
     }
 }
 
@@ -223,6 +229,18 @@ fn what_cannot_be_solved_is_refused() {
         let options = DgOptions { penalty: value, ..DgOptions::default() };
         assert!(matches!(fails(options), FlowError::Penalty { .. }));
     }
+}
+
+#[test]
+fn voronoi_cells_are_refused() {
+    let bounds = Bounds { min: [0.0; 2], max: [1.0; 2] };
+    let sites = [[0.2, 0.3], [0.7, 0.6]];
+    let cells = voronoi(&Delaunay::<2>::new(), &sites, bounds, &mut Silent).unwrap();
+    let grid = Grid::of_cells(&cells, None);
+    let problem = Problem::default();
+    let setting = Setting::new(&problem, &grid).unwrap();
+    let error = solve(&grid, &setting, &DgOptions::default(), &mut Silent).unwrap_err();
+    assert_eq!(error, FlowError::NotSimplices);
 }
 
 #[test]

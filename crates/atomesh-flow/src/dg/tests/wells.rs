@@ -75,7 +75,8 @@ fn pressure_around_a_well_is_logarithmic() {
         let wall = answer.solution.wells[0].wall_pressure.unwrap();
         let expected = -(1e-4_f64).ln() / (2.0 * PI);
         println!("  wall {wall} {expected}");
-        assert!((wall / expected - 1.0).abs() < 0.02, "{form:?} {order}: {wall} {expected}");
+        let away = (wall / expected - 1.0).abs();
+        assert!(away < if order == 1 { 0.03 } else { 0.015 }, "{form:?} {order}: {wall}");
     }
 }
 
