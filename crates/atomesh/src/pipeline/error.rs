@@ -10,6 +10,7 @@ use crate::mesh::ConnectError;
 use crate::optimize::OptimizeError;
 use crate::potential::PotentialError;
 use crate::region::RegionError;
+use crate::sample::SampleError;
 use crate::voronoi::VoronoiError;
 use crate::watch::Cancelled;
 
@@ -78,6 +79,9 @@ pub enum PipelineError {
     /// A mask or labels are of no use.
     #[error(transparent)]
     Region(RegionError),
+    /// The labels could not be sampled in cells.
+    #[error(transparent)]
+    Sample(SampleError),
     /// The mesh could not be improved.
     #[error(transparent)]
     Improve(ImproveError),
@@ -106,6 +110,7 @@ impl PipelineError {
                 | Self::Optimize(OptimizeError::Cancelled(_))
                 | Self::Connect(ConnectError::Cancelled(_))
                 | Self::Region(RegionError::Cancelled(_))
+                | Self::Sample(SampleError::Cancelled(_))
                 | Self::Improve(ImproveError::Cancelled(_))
                 | Self::Features(FeaturesError::Cancelled(_))
                 | Self::Voronoi(VoronoiError::Cancelled(_))
@@ -123,7 +128,7 @@ macro_rules! from {
         })*
     };
 }
-from!(LatticeError => Lattice, OptimizeError => Optimize, ConnectError => Connect, RegionError => Region, ImproveError => Improve, FeaturesError => Features, VoronoiError => Voronoi, MeasureError => Measure);
+from!(LatticeError => Lattice, OptimizeError => Optimize, ConnectError => Connect, RegionError => Region, SampleError => Sample, ImproveError => Improve, FeaturesError => Features, VoronoiError => Voronoi, MeasureError => Measure);
 
 /// What is odd but no error.
 #[derive(Clone, Debug, PartialEq, serde::Serialize, thiserror::Error)]

@@ -36,7 +36,7 @@ pub use outcome::{MeshReport, Outcome, VoronoiReport, sides};
 use crate::distance::{GRADIENT_LIMIT, Grading, NominalDistance, default_distance};
 use crate::enhance::{self, FeatureOptions, Features};
 use crate::geometry::{Point, compact_order};
-use crate::image::{Frame, Grid, Image, Units};
+use crate::image::{Frame, Grid, Image, Samples, Units};
 use crate::improve::{Align, ImproveReport};
 use crate::lattice::{
     GrowOptions, Lattice, Outlined, Place, ScatterOptions, fill_holes, grow_within, scatter, settle,
@@ -45,9 +45,9 @@ use crate::mesh::{Mesh, merge_duplicates};
 use crate::optimize::{EngineKind, Fields, OptimizeReport, optimize};
 use crate::potential::{ImagePotential, ImageWeight, Interpolation};
 use crate::region::{
-    Outline, RegionError, Trimmed, fit, islands, label_samples, majority, outline_facets, smooth,
-    trim,
+    Outline, RegionError, Trimmed, fit, islands, label_samples, outline_facets, smooth, trim,
 };
+use crate::sample::{SampleOptions, Statistic, sample_placed};
 use crate::voronoi::{PolyMesh, sites_apart, voronoi};
 use crate::watch::{Phase, Watch, check};
 use rayon::prelude::*;
@@ -412,10 +412,20 @@ impl<const D: usize> Prepared<'_, D> {
     }
 
     /// The label of each cell.
-    fn label(&self, mesh: &Mesh<D>, samples: &[i32]) -> Vec<i32> {
-        let mut labels = majority(mesh, &self.grid, samples);
+    fn label(
+        &self,
+        mesh: &Mesh<D>,
+        samples: &[i32],
+        watch: &mut dyn Watch,
+    ) -> Result<Vec<i32>, PipelineError> {
+        let frame = Frame::new(self.grid.shape).and_then(|f| f.with_spacing(self.grid.step));
+        let frame = frame.expect("a grid has samples and steps above 0");
+        let samples = Samples::I32(samples.to_vec());
+        let options = SampleOptions::new(&[Statistic::Majority]);
+        let found = sample_placed(mesh, (&frame, &samples), options, watch)?;
+        let mut labels: Vec<i32> = found.values[0].iter().map(|&label| label as i32).collect();
         islands(mesh, &mut labels, self.options.least_island);
-        labels
+        Ok(labels)
     }
 
     /// The fields that atoms move in.
@@ -454,7 +464,8 @@ impl<const D: usize> Prepared<'_, D> {
             Some(_) => outline_facets(&mesh, &self.grid.bounds()),
             None => Vec::new(),
         };
-        let labels = self.labels.as_ref().map(|labels| self.label(&mesh, labels));
+        let labels = self.labels.as_ref();
+        let labels = labels.map(|labels| self.label(&mesh, labels, watch)).transpose()?;
         let points = mesh.points().par_iter().with_min_len(1 << 10);
         let distance = points.clone().map(|p| self.distance.at(p) as f32).collect();
         let (low, high) = self.potential.range(); // a spline passes beyond it at jumps

@@ -1,11 +1,11 @@
 //! Cells by the labels of an image.
 //!
-//! A cell has the label that most of it is covered by; samples reach half a step around their centres.
+//! Which label a cell has is for `sample` to say; here is what follows from labels: islands, interfaces.
 
 use rayon::prelude::*;
 
-use crate::geometry::{Point, Sets};
-use crate::image::{Grid, Samples};
+use crate::geometry::Sets;
+use crate::image::Samples;
 use crate::mesh::Mesh;
 
 use super::RegionError;
@@ -23,74 +23,6 @@ pub fn label_samples(samples: &Samples) -> Result<Vec<i32>, RegionError> {
     let labels: Vec<Result<i32, RegionError>> =
         (0..samples.len()).into_par_iter().with_min_len(1 << 14).map(label).collect();
     labels.into_iter().collect()
-}
-
-/// Points along the longest edge of a cell, for a sample each.
-const POINTS_PER_SAMPLE: f64 = 2.0;
-/// The most divisions of a cell's edges.
-const MOST_DIVISIONS: usize = 16;
-
-/// The label of each cell of a mesh in lattice coordinates: the one that most of the cell is covered by, the
-/// least of those that cover as much. Measured at the centroids of the parts of an even division of the
-/// cell, two for each sample along its longest edge.
-///
-/// # Panics
-/// If there are not as many labels as the grid has samples.
-pub fn majority<const D: usize>(mesh: &Mesh<D>, grid: &Grid<D>, labels: &[i32]) -> Vec<i32> {
-    assert_eq!(labels.len(), grid.sample_count(), "one label a sample");
-    let strides = grid.strides();
-    let label_at = |p: &Point<D>| {
-        let index = (0..D).map(|k| {
-            let i = (p[k] / grid.step[k] + 0.5) as usize; // a cast takes what is negative to 0
-            i.min(grid.shape[k] - 1) * strides[k]
-        });
-        labels[index.sum::<usize>()]
-    };
-    let of_cell = |cell: &[u32]| {
-        let corner = |k: usize| &mesh.points()[cell[k] as usize];
-        let mut samples = 1.0_f64;
-        for i in 0..=D {
-            for j in 0..i {
-                for k in 0..D {
-                    samples = samples.max((corner(i)[k] - corner(j)[k]).abs() / grid.step[k]);
-                }
-            }
-        }
-        let divisions = ((POINTS_PER_SAMPLE * samples).ceil() as usize).clamp(2, MOST_DIVISIONS);
-        let mut counts: Vec<(i32, usize)> = Vec::new();
-        each_weight(D + 1, divisions, &mut |weights| {
-            // weights of the division's inner points: none is on the cell's boundary
-            let whole = (divisions * (D + 1)) as f64;
-            let p = std::array::from_fn(|k| {
-                let sum = |c: usize| (weights[c] * (D + 1) + 1) as f64 * corner(c)[k];
-                (0..=D).map(sum).sum::<f64>() / (whole + (D + 1) as f64)
-            });
-            let label = label_at(&p);
-            match counts.iter_mut().find(|(l, _)| *l == label) {
-                Some((_, count)) => *count += 1,
-                None => counts.push((label, 1)),
-            }
-        });
-        let best = counts.iter().max_by(|a, b| a.1.cmp(&b.1).then(b.0.cmp(&a.0)));
-        best.map_or(0, |&(label, _)| label)
-    };
-    mesh.corners().par_chunks_exact(D + 1).with_min_len(256).map(of_cell).collect()
-}
-
-/// Calls `visit` with all lists of `count` natural numbers that sum to `sum`; `count` is at most 4.
-fn each_weight(count: usize, sum: usize, visit: &mut dyn FnMut(&[usize; 4])) {
-    fn next(at: usize, rest: usize, weights: &mut [usize; 4], visit: &mut dyn FnMut(&[usize; 4])) {
-        if at == 0 {
-            weights[0] = rest;
-            visit(weights);
-            return;
-        }
-        for w in 0..=rest {
-            weights[at] = w;
-            next(at - 1, rest - w, weights, visit);
-        }
-    }
-    next(count - 1, sum, &mut [0; 4], visit);
 }
 
 /// Gives cells of islands, groups of fewer than `least` cells of one label that hang together by facets, the
@@ -163,8 +95,6 @@ pub fn interfaces<const D: usize>(mesh: &Mesh<D>, labels: &[i32]) -> Vec<Interfa
 mod tests {
     use super::*;
 
-    const GRID: Grid<2> = Grid { shape: [9, 5], step: [1.0, 1.0] };
-
     /// Triangles of a grid of squares of one sample.
     fn squares() -> Mesh<2> {
         let points = (0..45).map(|i| [f64::from(i % 9), f64::from(i / 9)]).collect();
@@ -175,38 +105,18 @@ mod tests {
         Mesh::new(points, corners).unwrap()
     }
 
-    /// Label 7 where x < 4.5, else −2.
-    fn halves() -> Vec<i32> {
-        (0..45).map(|i| if i % 9 < 5 { 7 } else { -2 }).collect()
-    }
-
-    #[test]
-    fn cells_have_the_label_that_covers_most_of_them() {
-        let mesh = squares();
-        let labels = majority(&mesh, &GRID, &halves());
-        for (cell, label) in mesh.cells().zip(&labels) {
-            let x = cell.iter().map(|&c| mesh.points()[c as usize][0]).sum::<f64>() / 3.0;
-            // both triangles of the square cut at 4.5 lie more on the side of their upright edge
-            assert_eq!(*label, if x < 4.5 { 7 } else { -2 }, "centroid at {x}");
-        }
-    }
-
-    #[test]
-    fn a_tetrahedron_counts_volume_and_not_corners() {
-        let points = vec![[0.0, 0.0, 0.0], [8.0, 0.0, 0.0], [0.0, 8.0, 0.0], [0.0, 0.0, 8.0]];
-        let mesh = Mesh::new(points, vec![0, 1, 2, 3]).unwrap();
-        let grid = Grid { shape: [9; 3], step: [1.0; 3] };
-        let below =
-            |height: usize| -> Vec<i32> { (0..729).map(|i| i32::from(i / 81 < height)).collect() };
-        // the plane z = h parts volumes of 1 − (1 − h/8)³: half at h = 1.65
-        assert_eq!(majority(&mesh, &grid, &below(2)), [0]); // up to 1.5: 0.46
-        assert_eq!(majority(&mesh, &grid, &below(3)), [1]); // up to 2.5: 0.67
+    /// Label 7 on the cells left of x = 4, −2 on those right of x = 5; of the two in each square between them, on
+    /// the side of the upright edge.
+    fn halves(mesh: &Mesh<2>) -> Vec<i32> {
+        let middle =
+            |cell: &[u32]| cell.iter().map(|&c| mesh.points()[c as usize][0]).sum::<f64>() / 3.0;
+        mesh.cells().map(|cell| if middle(cell) < 4.5 { 7 } else { -2 }).collect()
     }
 
     #[test]
     fn interfaces_are_the_facets_between_labels() {
         let mesh = squares();
-        let mut labels = majority(&mesh, &GRID, &halves());
+        let mut labels = halves(&mesh);
         // the cells between x = 4 and 5 are one of each: their diagonals are the interface
         let found = interfaces(&mesh, &labels);
         assert_eq!(found.len(), 1);
@@ -220,7 +130,7 @@ mod tests {
     #[test]
     fn small_islands_join_the_neighbour_with_most_facets() {
         let mesh = squares();
-        let mut labels = majority(&mesh, &GRID, &halves());
+        let mut labels = halves(&mesh);
         let calm = labels.clone();
         labels[0] = 5;
         labels[10] = 5;

@@ -16,7 +16,7 @@ mod smooth;
 mod trim;
 
 pub use components::components;
-pub use labels::{interfaces, islands, label_samples, majority};
+pub use labels::{interfaces, islands, label_samples};
 pub use outline::Outline;
 pub use smooth::{fit, smooth};
 pub(crate) use trim::free_axes;

@@ -38,7 +38,7 @@ mod tests {
         let image = Image::new(frame, Samples::F32(samples)).unwrap();
         let bounds = Bounds { min: [0.0; 3], max: [6.0, 5.0, 4.0] };
         let sites = [[1.0, 1.0, 1.0], [5.0, 1.5, 2.0], [3.0, 4.5, 3.0], [2.0, 3.0, 0.5]];
-        let cells = voronoi(&Delaunay::volume(), &sites, bounds, &mut Silent).unwrap();
+        let cells = voronoi(&Delaunay::<3>::new(), &sites, bounds, &mut Silent).unwrap();
         let options = SampleOptions::new(&[Statistic::Total, Statistic::Mean]);
         let found = sample(&cells, &image, options, &mut Silent).unwrap();
         let sum = |values: &[f64]| values.iter().sum::<f64>();
