@@ -1,5 +1,7 @@
 //! Wells: the radius at which the pressure around a well is that of its cell.
 
+use std::f64::consts::TAU;
+
 use atomesh::geometry::{Point, difference, distance_squared, dot};
 use atomesh::voronoi::PolyMesh;
 use atomesh::watch::Silent;
@@ -23,7 +25,8 @@ pub(super) struct Coupling {
     pub well: usize,
     /// The cell that it flows into.
     pub cell: u32,
-    /// What flows for a unit of difference between wall and cell; of wells that have a radius.
+    /// What flows into the box for a unit of difference between wall and cell, on a side half of what a well
+    /// brings elsewhere; of wells that have a radius.
     pub index: Option<f64>,
 }
 
@@ -38,11 +41,13 @@ pub(super) fn couple<const D: usize>(
         let index = match (well.control, well.radius) {
             (Control::Rate(_), None) => None,
             (_, radius) => {
-                let equivalent = match cells.cell_count() {
-                    1 => placed.equivalent_radius::<D>(),
-                    _ => equivalent_radius(cells, cell as usize, RINGS)?,
+                let around = Around::new(cells, cell as usize, RINGS);
+                let equivalent = match around.unknown_count {
+                    0 => placed.equivalent_radius::<D>(),
+                    _ => around.radius()?,
                 };
-                Some(well_index::<D>(&well.name, placed.permeability, radius, equivalent)?)
+                let k = placed.permeability;
+                Some(around.open() * well_index::<D>(&well.name, k, radius, equivalent)?)
             }
         };
         Ok(Coupling { well: placed.well, cell, index })
@@ -75,11 +80,8 @@ pub fn equivalent_radius<const D: usize>(
     rings: usize,
 ) -> Result<f64, FlowError> {
     let around = Around::new(cells, cell, rings);
-    let pressure = around.pressure()?;
-    Ok(match D {
-        2 => (-std::f64::consts::TAU * pressure).exp(),
-        _ => 1.0 / (2.0 * std::f64::consts::TAU * pressure),
-    })
+    assert!(around.unknown_count > 0, "a well needs a cell beside its own");
+    around.radius()
 }
 
 /// The cells around a well.
@@ -96,7 +98,6 @@ struct Around<'a, const D: usize> {
 impl<'a, const D: usize> Around<'a, D> {
     /// As many rings as there are, up to `rings`.
     fn new(cells: &'a PolyMesh<D>, cell: usize, rings: usize) -> Self {
-        assert!(cells.cell_count() > 1, "a well needs a cell beside its own");
         let mut found = vec![cell as u32];
         let mut seen = std::collections::BTreeSet::from([cell as u32]);
         let mut unknown_count = 0;
@@ -118,6 +119,21 @@ impl<'a, const D: usize> Around<'a, D> {
             unknown_count = end;
         }
         Self { cells, site: cells.sites()[cell], found, unknown_count }
+    }
+
+    /// The share of the whole angle that the well sees of the box: 1, or 1/2 from a side of it.
+    fn open(&self) -> f64 {
+        let faces = self.cells.faces_of(self.found[0] as usize);
+        faces.map(|(face, sign)| self.share_seen(face, sign)).sum()
+    }
+
+    /// The radius at which the pressure is that of the well's cell.
+    fn radius(&self) -> Result<f64, FlowError> {
+        let pressure = self.pressure()?;
+        Ok(match D {
+            2 => (-TAU * pressure).exp(),
+            _ => 1.0 / (2.0 * TAU * pressure),
+        })
     }
 
     /// The pressure of the well's cell, for a rate and permeability of 1.
@@ -144,13 +160,11 @@ impl<'a, const D: usize> Around<'a, D> {
         number.sort_unstable();
         let mut entries = Vec::new();
         let mut rhs = vec![0.0; self.unknown_count];
+        rhs[0] = self.open();
         for (row, &cell) in self.found[..self.unknown_count].iter().enumerate() {
             for (face, sign) in self.cells.faces_of(cell as usize) {
-                let share = self.share_seen(face, sign);
-                // the well itself, as far as it sees anything
-                rhs[row] += if row == 0 { share } else { 0.0 };
                 let Some(&neighbour) = self.cells.neighbours().get(face) else {
-                    rhs[row] -= share;
+                    rhs[row] -= self.share_seen(face, sign);
                     continue;
                 };
                 let other = if sign > 0.0 { neighbour } else { self.cells.owners()[face] };
@@ -178,8 +192,8 @@ impl<'a, const D: usize> Around<'a, D> {
     fn field(&self, cell: u32) -> f64 {
         let squared = distance_squared(&self.site, &self.cells.sites()[cell as usize]);
         match D {
-            2 => -0.5 * squared.ln() / std::f64::consts::TAU,
-            _ => 0.5 / (std::f64::consts::TAU * squared.sqrt()),
+            2 => -0.5 * squared.ln() / TAU,
+            _ => 0.5 / (TAU * squared.sqrt()),
         }
     }
 
@@ -195,7 +209,7 @@ impl<'a, const D: usize> Around<'a, D> {
             return 0.0;
         }
         let angle: f64 = self.cells.simplices(face).map(|part| view_angle(&part, &self.site)).sum();
-        height.signum() * angle / if D == 2 { 1.0 } else { 2.0 } / std::f64::consts::TAU
+        height.signum() * angle / if D == 2 { 1.0 } else { 2.0 } / TAU
     }
 }
 

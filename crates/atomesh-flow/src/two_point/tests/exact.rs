@@ -169,9 +169,7 @@ fn beside_lines(slope: f64, height: f64) -> Vec<Point<2>> {
     let mut random = Pcg64::seed_from_u64(7);
     let along: Vec<f64> =
         (-30..30).map(|n| 0.03 * (f64::from(n) + 0.3 * random.random::<f64>())).collect();
-    let place = |s: f64, t: f64| {
-        [0.5 + (s - slope * t) / length, 0.475 + (slope * s + t) / length]
-    };
+    let place = |s: f64, t: f64| [0.5 + (s - slope * t) / length, 0.475 + (slope * s + t) / length];
     let sites = heights.flat_map(|t| along.iter().map(move |&s| place(s, t)));
     sites.filter(|p| cube::<2>(1.0).contains(p)).collect()
 }

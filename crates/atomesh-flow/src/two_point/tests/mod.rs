@@ -62,9 +62,8 @@ fn scattered<const D: usize>(count: usize, seed: u64) -> Vec<Point<D>> {
             1 => 1.0,
             _ => random.random::<f64>(),
         });
-        let apart = |other: &Point<D>| {
-            atomesh::geometry::distance_squared(&site, other) > least * least
-        };
+        let apart =
+            |other: &Point<D>| atomesh::geometry::distance_squared(&site, other) > least * least;
         if sites.iter().all(apart) {
             sites.push(site);
         }
@@ -117,7 +116,9 @@ fn answer<const D: usize>(
     let setting = Setting::new(problem, grid).unwrap();
     let found = solve(cells, grid, &setting, &SolveOptions::default(), &mut Silent).unwrap();
     let balance = found.balance(grid);
-    assert!(balance.relative_error() <= 1e-10, "{balance:?}");
+    // what flows is of size 1 in all tests, or nought, and then there is only rounding to compare with
+    let scale = balance.scale.max(1e-3);
+    assert!(balance.cell_error.max(balance.error.abs()) <= 1e-10 * scale, "{balance:?}");
     assert_eq!(found.leak(grid, &setting), 0.0);
     found
 }
