@@ -3,6 +3,8 @@
 use atomesh::image::Frame;
 use atomesh::mesh::{Mesh, Quadratic, Tags};
 
+use super::cell_fields::{CellFields, VectorField};
+
 /// Names that some format gives to other arrays.
 const RESERVED: [&str; 4] = ["points", "cells", "metadata", super::metadata::NAME];
 
@@ -102,6 +104,11 @@ pub struct Field<'a> {
 }
 
 impl<'a> Field<'a> {
+    /// A field whose name and number of values were checked.
+    pub(super) fn new(name: &'a str, values: Values<'a>) -> Self {
+        Self { name, values }
+    }
+
     /// The name, fit for every format.
     pub fn name(&self) -> &'a str {
         self.name
@@ -119,7 +126,7 @@ impl<'a> Field<'a> {
 pub struct MeshData<'a, const D: usize> {
     mesh: &'a Mesh<D>,
     point_fields: Vec<Field<'a>>,
-    cell_fields: Vec<Field<'a>>,
+    cell_fields: CellFields<'a, D>,
     frame: Option<&'a Frame<D>>,
     provenance: Option<&'a Provenance>,
     tags: Option<&'a Tags<D>>,
@@ -132,7 +139,7 @@ impl<'a, const D: usize> MeshData<'a, D> {
         Self {
             mesh,
             point_fields: vec![],
-            cell_fields: vec![],
+            cell_fields: CellFields::new(mesh.cell_count()),
             frame: None,
             provenance: None,
             tags: None,
@@ -181,8 +188,9 @@ impl<'a, const D: usize> MeshData<'a, D> {
         name: &'a str,
         values: &'a [f32],
     ) -> Result<Self, MeshDataError> {
-        let field = checked(&self.point_fields, name, values.into(), self.nodes().len())?;
-        self.point_fields.push(field);
+        let others = self.point_fields.iter().map(Field::name);
+        check_field(others, name, [values.len(), self.nodes().len()])?;
+        self.point_fields.push(Field::new(name, values.into()));
         Ok(self)
     }
 
@@ -195,9 +203,20 @@ impl<'a, const D: usize> MeshData<'a, D> {
         name: &'a str,
         values: impl Into<Values<'a>>,
     ) -> Result<Self, MeshDataError> {
-        let (values, count) = (values.into(), self.mesh.cell_count());
-        let field = checked(&self.cell_fields, name, values, count)?;
-        self.cell_fields.push(field);
+        self.cell_fields = self.cell_fields.with_numbers(name, values)?;
+        Ok(self)
+    }
+
+    /// The same with a vector in each cell. VTU alone holds vectors; other formats leave them out.
+    ///
+    /// # Errors
+    /// As [`Self::with_cell_field`].
+    pub fn with_cell_vectors(
+        mut self,
+        name: &'a str,
+        vectors: &'a [[f64; D]],
+    ) -> Result<Self, MeshDataError> {
+        self.cell_fields = self.cell_fields.with_vectors(name, vectors)?;
         Ok(self)
     }
 
@@ -232,7 +251,12 @@ impl<'a, const D: usize> MeshData<'a, D> {
 
     /// The values in the cells.
     pub fn cell_fields(&self) -> &[Field<'a>] {
-        &self.cell_fields
+        self.cell_fields.numbers()
+    }
+
+    /// The vectors in the cells.
+    pub fn cell_vectors(&self) -> &[VectorField<'a, D>] {
+        self.cell_fields.vectors()
     }
 
     /// The frame of the image, if it is known.
@@ -251,26 +275,22 @@ impl<'a, const D: usize> MeshData<'a, D> {
     }
 }
 
-/// A field whose name is new among `others` and whose values are `expected` in number.
-fn checked<'a>(
-    others: &[Field<'_>],
-    name: &'a str,
-    values: Values<'a>,
-    expected: usize,
-) -> Result<Field<'a>, MeshDataError> {
+/// Checks that a field's name fits and is new among `others`, and that it has as many values as it should:
+/// found and expected.
+pub(super) fn check_field<'n>(
+    mut others: impl Iterator<Item = &'n str>,
+    name: &str,
+    [found, expected]: [usize; 2],
+) -> Result<(), MeshDataError> {
     let plain = |c: u8| c.is_ascii_alphanumeric() || b"_-".contains(&c);
     let fits = (1..=64).contains(&name.len()) && name.bytes().all(plain);
-    if !fits || RESERVED.contains(&name) || others.iter().any(|f| f.name == name) {
+    if !fits || RESERVED.contains(&name) || others.any(|other| other == name) {
         return Err(MeshDataError::FieldName { name: name.into() });
     }
-    if values.len() != expected {
-        return Err(MeshDataError::FieldLength {
-            name: name.into(),
-            expected,
-            found: values.len(),
-        });
+    if found != expected {
+        return Err(MeshDataError::FieldLength { name: name.into(), expected, found });
     }
-    Ok(Field { name, values })
+    Ok(())
 }
 
 /// A named value for each point, or each cell, as read from a file.

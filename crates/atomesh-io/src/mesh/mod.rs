@@ -5,15 +5,18 @@
 //! [`Provenance`]; all but VTK legacy and NPZ hold its tags. The same
 //! [`MeshData`] makes the same bytes, at any number of threads.
 
+mod cell_fields;
 pub mod cells;
 pub(crate) mod column;
 mod data;
+mod fluxes;
 pub mod inp;
 mod metadata;
 pub mod msh;
 pub mod npz;
 pub mod polymesh;
 mod read;
+mod streamlines;
 mod tags;
 pub mod vtk;
 pub mod vtu;
@@ -23,10 +26,13 @@ use std::path::{Path, PathBuf};
 
 use atomesh::watch::{Cancelled, Watch};
 
+pub use cell_fields::{CellFields, VectorField};
 pub use data::{
     AnyMesh, Field, LoadedMesh, MeshData, MeshDataError, OwnedField, Provenance, Values,
 };
+pub use fluxes::{FacetFlux, FluxFiles, FluxTable, write_fluxes};
 pub use read::MeshReadError;
+pub use streamlines::{Streamline, Streamlines, write_streamlines};
 
 use crate::atomic_file::AtomicFile;
 use msh::{MshEncoding, MshVersion};
@@ -125,6 +131,9 @@ pub enum MeshWriteError {
         /// How many there may be.
         limit: usize,
     },
+    /// A field does not fit.
+    #[error(transparent)]
+    Field(#[from] MeshDataError),
     /// The cells make no sense as faces.
     #[error(transparent)]
     PolyMesh(#[from] polymesh::PolyMeshError),

@@ -70,12 +70,12 @@ pub fn write_connections<const D: usize>(
 const AXES: [&str; 3] = ["x", "y", "z"];
 
 /// The names of a vector's components.
-fn vector<const D: usize>(name: &str) -> String {
+pub(in super::super) fn vector<const D: usize>(name: &str) -> String {
     AXES[..D].iter().map(|axis| format!("{name}_{axis}")).collect::<Vec<_>>().join(",")
 }
 
 /// Appends numbers, each with as many digits as tell it from all others.
-fn put(text: &mut String, numbers: &[f64]) {
+pub(in super::super) fn put(text: &mut String, numbers: &[f64]) {
     for number in numbers {
         let _ = write!(text, ",{number:?}");
     }

@@ -3,7 +3,7 @@
 //! All hold world coordinates, and name cells, faces and points from 0 on in the mesh's order, so that a cell of
 //! one file is the cell of that number in the others.
 
-mod connections;
+pub(super) mod connections;
 mod foam;
 
 pub use connections::{ConnectionFiles, write_connections};

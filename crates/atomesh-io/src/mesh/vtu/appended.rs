@@ -13,6 +13,7 @@ use flate2::write::ZlibEncoder;
 use rayon::prelude::*;
 
 use super::super::MeshWriteError;
+use super::super::cell_fields::VectorField;
 use super::super::column::{Column, Endian};
 use super::super::data::{Field, Values};
 
@@ -86,14 +87,32 @@ impl<'a> Head<'a> {
         self.array(kind, name, &tuples, column);
     }
 
-    /// Names fields of cells, and an array of Int32.
-    pub fn cell_data(&mut self, fields: &[Field<'a>], numbers: Option<(&str, Column<'a>)>) {
+    /// Names fields of cells, then vectors, z being 0 in flat meshes, then an array of Int32.
+    pub fn cell_data<const D: usize>(
+        &mut self,
+        fields: &[Field<'a>],
+        vectors: &[VectorField<'a, D>],
+        numbers: Option<(&str, Column<'a>)>,
+    ) {
         self.text("<CellData>\n");
-        fields.iter().for_each(|field| self.field(field));
+        self.cell_fields(fields, vectors);
         if let Some((name, column)) = numbers {
             self.array("Int32", name, "", column);
         }
         self.text("</CellData>\n");
+    }
+
+    /// Names fields of cells and vectors, without a tag around them.
+    pub fn cell_fields<const D: usize>(
+        &mut self,
+        fields: &[Field<'a>],
+        vectors: &[VectorField<'a, D>],
+    ) {
+        fields.iter().for_each(|field| self.field(field));
+        for field in vectors {
+            let column = Column::points(field.vectors(), Endian::Little);
+            self.array("Float64", field.name(), "NumberOfComponents=\"3\"", column);
+        }
     }
 
     /// Writes the head, all arrays, and the end of the file.

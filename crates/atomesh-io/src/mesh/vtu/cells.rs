@@ -5,6 +5,7 @@ use std::io::{Seek, Write};
 use atomesh::voronoi::PolyMesh;
 use atomesh::watch::Watch;
 
+use super::super::cell_fields::CellFields;
 use super::super::cells::CellData;
 use super::super::column::{Column, Endian};
 use super::super::{MeshWriteError, metadata};
@@ -25,6 +26,20 @@ pub fn write_cells_vtu<const D: usize>(
     data: &CellData<D>,
     watch: &mut dyn Watch,
 ) -> Result<(), MeshWriteError> {
+    write_cells_vtu_with(out, data, &CellFields::new(data.mesh.cell_count()), watch)
+}
+
+/// Writes polygons or polyhedra with what is known of each, as cell data: for that of polyhedra meshio 5 refuses
+/// the file; ParaView reads it.
+///
+/// # Errors
+/// As [`write_cells_vtu`].
+pub fn write_cells_vtu_with<const D: usize>(
+    out: &mut (impl Write + Seek),
+    data: &CellData<D>,
+    fields: &CellFields<D>,
+    watch: &mut dyn Watch,
+) -> Result<(), MeshWriteError> {
     let (text, mesh) = (data.metadata(), data.mesh);
     let topology = Topology::of(mesh);
     let sites = padded(mesh.sites());
@@ -41,12 +56,17 @@ pub fn write_cells_vtu<const D: usize>(
         head.text(&format!("</FieldData>\n{piece}<CellData>\n"));
         head.array("Float64", "volume", "", volume);
         head.array("Float64", "site", vectors, site);
+        head.cell_fields(fields.numbers(), fields.vectors());
         head.text("</CellData>\n<Points>\n");
     } else {
         let tuples = format!("NumberOfTuples=\"{cells}\"");
         head.array("Float64", "volume", &tuples, volume);
         head.array("Float64", "site", &format!("{vectors} {tuples}"), site);
-        head.text(&format!("</FieldData>\n{piece}<Points>\n"));
+        head.text(&format!("</FieldData>\n{piece}"));
+        if !fields.is_empty() {
+            head.cell_data(fields.numbers(), fields.vectors(), None);
+        }
+        head.text("<Points>\n");
     }
     head.array("Float64", "Points", vectors, Column::slice(&points, Endian::Little));
     head.text("</Points>\n<Cells>\n");

@@ -2,13 +2,15 @@
 
 pub(crate) mod appended;
 pub(crate) mod array;
+mod broken;
 mod cells;
 pub(crate) mod poly;
 pub(crate) mod read;
 mod write;
 pub(crate) mod xml;
 
-pub use cells::write_cells_vtu;
+pub use broken::write_broken_vtu;
+pub use cells::{write_cells_vtu, write_cells_vtu_with};
 pub use read::read_vtu;
 pub use write::write_vtu;
 

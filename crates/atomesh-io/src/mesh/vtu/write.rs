@@ -1,7 +1,7 @@
 //! Writing VTU.
 //!
 //! Points are Float64 with z = 0 in flat meshes; indices are Int32, or Int64 where they do
-//! not fit; fields are Float32, or Float64 if they came so. Regions are the cell array `region`, Int32, with
+//! not fit; fields are Float32, or Float64 if they came so; vectors Float64 with z = 0 in flat meshes. Regions are the cell array `region`, Int32, with
 //! `region_ids` and `region_names` in the field data. There the groups of facets are too: `facets`, the corners
 //! of each; `facet_group`, the number of its group; `facet_group_ids` and `facet_group_names`. Names are text,
 //! UInt8, one a line.
@@ -94,7 +94,7 @@ fn piece<'a, const D: usize>(head: &mut Head<'a>, data: &MeshData<'a, D>) {
     head.fields("PointData", data.point_fields());
     let regions = data.tags().and_then(Tags::regions);
     let region = regions.map(|r| ("region", Column::slice(&r.of_cells, Endian::Little)));
-    head.cell_data(data.cell_fields(), region);
+    head.cell_data(data.cell_fields(), data.cell_vectors(), region);
     head.text("<Points>\n");
     let vectors = "NumberOfComponents=\"3\"";
     head.array("Float64", "Points", vectors, Column::points(data.nodes(), Endian::Little));
