@@ -5,7 +5,8 @@ use atomesh::mesh::Mesh;
 use atomesh::pipeline::Method;
 use atomesh::voronoi::PolyMesh;
 use atomesh_draw::{
-    DrawError, Picture, Style, draw_flat, draw_polygons, draw_polyhedra, draw_slices,
+    DrawError, FlowPicture, FlowStyle, Picture, Style, draw_flat, draw_flow, draw_flow_slices,
+    draw_polygons, draw_polyhedra, draw_slices,
 };
 use atomesh_io::image::AnyImage;
 
@@ -17,6 +18,8 @@ pub struct Dimension<const D: usize> {
     pub draw: fn(&Image<D>, &Mesh<D>, &Style) -> Result<Picture, DrawError>,
     /// Draws Voronoi cells in sample coordinates over their image.
     pub draw_cells: fn(&Image<D>, &PolyMesh<D>, &Style) -> Result<Picture, DrawError>,
+    /// Draws flow in sample coordinates.
+    pub draw_flow: fn(&FlowPicture<'_, D>, &Style, &FlowStyle) -> Result<Picture, DrawError>,
     /// The image if it has `D` axes.
     pub image: fn(AnyImage) -> Option<Image<D>>,
     /// What the cells are called, more than one of them.
@@ -32,6 +35,7 @@ impl Dimension<2> {
             method: Method::flat(),
             draw: draw_flat,
             draw_cells: draw_polygons,
+            draw_flow: |flow, style, flow_style| draw_flow(flow, style, flow_style),
             image: |any| match any {
                 AnyImage::Flat(image) => Some(image),
                 AnyImage::Volume(_) => None,
@@ -55,6 +59,7 @@ impl Dimension<3> {
                 let style = Style { atoms: true, ..style.clone() };
                 draw_polyhedra(image, mesh, image.frame().shape().map(|n| n / 2), &style)
             },
+            draw_flow: |flow, style, flow_style| draw_flow_slices(flow, None, style, flow_style),
             image: |any| match any {
                 AnyImage::Volume(image) => Some(image),
                 AnyImage::Flat(_) => None,

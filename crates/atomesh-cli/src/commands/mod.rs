@@ -4,6 +4,7 @@ pub mod check;
 pub mod completions;
 pub mod enhance;
 pub mod features;
+pub mod flow;
 pub mod info;
 pub mod man;
 pub mod mesh;
