@@ -141,6 +141,22 @@ pub enum FlowError {
         "the discontinuous Galerkin scheme has no functions on Voronoi cells; expected triangles or tetrahedra"
     )]
     NotSimplices,
+    /// A porosity that is none.
+    #[error("the porosity of cell {cell} is {value}; expected more than 0, at most 1")]
+    Porosity {
+        /// The cell.
+        cell: usize,
+        /// The value found.
+        value: f64,
+    },
+    /// There is not one porosity for each cell.
+    #[error("porosities of {found} cells; the mesh has {expected}")]
+    PorosityCount {
+        /// The number given.
+        found: usize,
+        /// The number of cells.
+        expected: usize,
+    },
     /// The linear equations were not solved.
     #[error(transparent)]
     Solve(#[from] SolveError),

@@ -41,7 +41,7 @@ enum Shape<const D: usize> {
     /// Triangles or tetrahedra.
     Simplices(Mesh<D>),
     /// Each cell is what is nearest to its site.
-    Sites(Vec<Point<D>>),
+    Cells(PolyMesh<D>),
 }
 
 /// What flow needs to know of a mesh: cells, facets, and names of facets.
@@ -121,7 +121,7 @@ impl<const D: usize> Grid<D> {
                 sets[first + number as usize - 1].facets.push(face as u32);
             }
         }
-        let shape = Shape::Sites(mesh.sites().to_vec());
+        let shape = Shape::Cells(mesh.clone());
         Self::new(mesh.measures().to_vec(), mesh.centroids().to_vec(), facets, sets, shape)
     }
 
@@ -203,7 +203,8 @@ impl<const D: usize> Grid<D> {
     pub fn cells_at(&self, place: &Point<D>) -> Vec<u32> {
         match &self.shape {
             Shape::Simplices(mesh) => simplices_at(mesh, place),
-            Shape::Sites(sites) => {
+            Shape::Cells(mesh) => {
+                let sites = mesh.sites();
                 let away = |site: &Point<D>| {
                     let way = difference(site, place);
                     dot(&way, &way)
@@ -224,17 +225,22 @@ impl<const D: usize> Grid<D> {
 
     /// The sites of Voronoi cells; `None` for triangles and tetrahedra.
     pub fn sites(&self) -> Option<&[Point<D>]> {
-        match &self.shape {
-            Shape::Sites(sites) => Some(sites),
-            Shape::Simplices(..) => None,
-        }
+        self.cells().map(PolyMesh::sites)
     }
 
     /// The mesh of triangles or tetrahedra; `None` for Voronoi cells.
     pub fn mesh(&self) -> Option<&Mesh<D>> {
         match &self.shape {
             Shape::Simplices(mesh) => Some(mesh),
-            Shape::Sites(_) => None,
+            Shape::Cells(_) => None,
+        }
+    }
+
+    /// The mesh of Voronoi cells; `None` for triangles and tetrahedra.
+    pub fn cells(&self) -> Option<&PolyMesh<D>> {
+        match &self.shape {
+            Shape::Cells(mesh) => Some(mesh),
+            Shape::Simplices(_) => None,
         }
     }
 }

@@ -177,7 +177,7 @@ pub fn solve<const D: usize>(
     }
     let order = || {
         let limit = options.memory as f64 / 8.0;
-        Elimination::new(system.matrix, system.block, system.places, limit)
+        Elimination::new(system.matrix, system.block, system.places, (!system.is_symmetric, limit))
     };
     match options.method {
         Method::Direct => direct(system, &order(), options, watch),

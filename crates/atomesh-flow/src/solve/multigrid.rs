@@ -97,7 +97,7 @@ impl<'a> Last<'a> {
         places: &[Point<D>],
         is_symmetric: bool,
     ) -> Self {
-        let elimination = Elimination::new(&matrix, 1, places, MEMORY as f64);
+        let elimination = Elimination::new(&matrix, 1, places, (!is_symmetric, MEMORY as f64));
         match Factors::new(&matrix, &elimination, is_symmetric, MEMORY) {
             Ok(factors) => Self::Factors(Box::new(factors)),
             Err(_) => Self::Sweeps(Sweeps::new(matrix)),

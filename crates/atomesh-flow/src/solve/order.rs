@@ -53,6 +53,25 @@ impl Graph {
         Self { starts, others }
     }
 
+    /// Of blocks that are coupled, or coupled to the same one: a factor with row pivots is bounded by that of `AᵀA`
+    /// (George & Ng 1985).
+    fn squared(&self) -> Self {
+        let (mut starts, mut others) = (vec![0], Vec::new());
+        let mut seen = vec![u32::MAX; self.starts.len() - 1];
+        for own in 0..self.starts.len() as u32 - 1 {
+            seen[own as usize] = own;
+            for &middle in self.beside(own) {
+                for &other in std::iter::once(&middle).chain(self.beside(middle)) {
+                    if std::mem::replace(&mut seen[other as usize], own) != own {
+                        others.push(other);
+                    }
+                }
+            }
+            starts.push(others.len());
+        }
+        Self { starts, others }
+    }
+
     fn beside(&self, block: u32) -> &[u32] {
         &self.others[self.starts[block as usize]..self.starts[block as usize + 1]]
     }
@@ -63,14 +82,15 @@ impl Graph {
 pub struct Elimination {
     /// The unknowns in their order, those of a block together.
     pub order: Vec<u32>,
-    /// The values of a Cholesky factor; infinite if there are more than the limit.
+    /// The values of a factor; infinite if there are more than the limit.
     pub values: f64,
     /// The multiplications to find it.
     pub work: f64,
 }
 
 impl Elimination {
-    /// Orders the unknowns of a square matrix and counts what the factors take, up to `limit` values.
+    /// Orders the unknowns of a square matrix and counts what the factors take, up to `limit` values: those of a Cholesky
+    /// factor, or, with row pivots, of each of the factors L and U at most.
     ///
     /// # Panics
     /// If there is not one place for each block.
@@ -78,10 +98,13 @@ impl Elimination {
         matrix: &Sparse,
         block: usize,
         places: &[Point<D>],
-        limit: f64,
+        (has_pivots, limit): (bool, f64),
     ) -> Self {
         assert_eq!(places.len() * block, matrix.row_count(), "a place for each block");
-        let graph = Graph::of(matrix, block);
+        let mut graph = Graph::of(matrix, block);
+        if has_pivots {
+            graph = graph.squared();
+        }
         let blocks = dissect(&graph, places);
         let size = block as f64;
         let (blocks, counts) = postorder(&graph, blocks, limit / (size * size));

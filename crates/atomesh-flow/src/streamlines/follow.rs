@@ -1,0 +1,195 @@
+//! Following a line from piece to piece.
+
+use atomesh::geometry::Point;
+
+use super::pieces::{Beyond, Field, Piece};
+use super::simplex::{Corners, exit};
+use super::starts::Start;
+use super::{End, Porosity, Streamline, TraceOptions};
+use crate::setting::Setting;
+
+/// A line that has not moved for so many steps circles around a corner.
+const STILL: usize = 1000;
+
+/// What ends lines: wells that take all that flows into their cells.
+struct Sink<const D: usize> {
+    well: usize,
+    place: Point<D>,
+    /// From the boundary of its cells to its place.
+    time: f64,
+}
+
+/// Follows lines in a field.
+pub struct Tracer<'a, const D: usize> {
+    field: &'a Field<'a, D>,
+    porosity: Porosity<'a>,
+    limit: usize,
+    sinks: Vec<Sink<D>>,
+    /// The number of a cell's sink, from 1.
+    sink_of: Vec<u32>,
+}
+
+/// A well's net rate and, out of and into its cells, what flows through the facets around them; the volume of
+/// their pores.
+pub struct WellCells {
+    pub rate: f64,
+    pub outward: f64,
+    pub inward: f64,
+    pub pores: f64,
+}
+
+impl WellCells {
+    pub fn new<const D: usize>(
+        field: &Field<'_, D>,
+        cells: &[u32],
+        porosity: &Porosity<'_>,
+    ) -> Self {
+        let mut own = Self { rate: 0.0, outward: 0.0, inward: 0.0, pores: 0.0 };
+        for &cell in cells {
+            let cell = cell as usize;
+            own.pores += porosity.of(cell) * field.grid.measures()[cell];
+            for &facet in field.grid.facets_of(cell) {
+                let beyond = field.beyond(cell, facet as usize);
+                if beyond.is_some_and(|other| cells.binary_search(&other).is_ok()) {
+                    continue;
+                }
+                let flux = field.out_of(cell, facet as usize);
+                own.rate += flux;
+                own.outward += flux.max(0.0);
+                own.inward += (-flux).max(0.0);
+            }
+        }
+        own
+    }
+}
+
+impl<'a, const D: usize> Tracer<'a, D> {
+    pub fn new(
+        field: &'a Field<'a, D>,
+        setting: &Setting<'_, D>,
+        options: &TraceOptions<'a>,
+    ) -> Self {
+        let mut sinks = Vec::new();
+        let mut sink_of = vec![0; field.grid.cell_count()];
+        for placed in setting.wells() {
+            let around = WellCells::new(field, &placed.cells, &options.porosity);
+            let takes = field.solution.wells[placed.well].rate < 0.0;
+            if !takes || around.inward <= 0.0 || around.outward > 1e-9 * around.inward {
+                continue;
+            }
+            let place = setting.problem().wells[placed.well].place;
+            sinks.push(Sink { well: placed.well, place, time: around.pores / around.inward });
+            placed.cells.iter().for_each(|&cell| sink_of[cell as usize] = sinks.len() as u32);
+        }
+        Self { field, porosity: options.porosity, limit: options.limit, sinks, sink_of }
+    }
+
+    /// Follows a line to its end.
+    pub fn follow(&self, start: &Start<D>) -> Streamline<D> {
+        let mut line = Streamline {
+            points: vec![start.place],
+            times: vec![0.0],
+            cells: Vec::new(),
+            from: start.from,
+            to: None,
+            end: End::Boundary,
+        };
+        if let Some((well, cell, time)) = start.well {
+            line.points[0] = well;
+            push(&mut line, start.place, time, cell);
+        }
+        let mut at = At { numbers: start.numbers, weights: start.weights };
+        let mut into = (start.facet, start.into);
+        let mut still = 0;
+        while let (facet, Some(cell)) = into {
+            if let Some(sink) =
+                self.sinks.get((self.sink_of[cell as usize] as usize).wrapping_sub(1))
+            {
+                push(&mut line, sink.place, sink.time, cell);
+                (line.to, line.end) = (Some(sink.well), End::Well);
+                break;
+            }
+            let before = line.points.len();
+            match self.cross(cell, facet, &mut at, &mut line) {
+                Ok(next) => into = (next, self.field.beyond(cell as usize, next as usize)),
+                Err(end) => {
+                    line.end = end;
+                    break;
+                }
+            }
+            still = if line.points.len() > before { 0 } else { still + 1 };
+            if still > STILL {
+                line.end = End::Stagnation;
+                break;
+            }
+        }
+        line
+    }
+
+    /// Crosses a cell, entered through a facet; returns the facet through which the line leaves.
+    fn cross(
+        &self,
+        cell: u32,
+        facet: u32,
+        at: &mut At,
+        line: &mut Streamline<D>,
+    ) -> Result<u32, End> {
+        let pieces = self.field.pieces(cell as usize);
+        let holds = |piece: &Piece<D>| {
+            piece.beyond.contains(&Beyond::Facet(facet)) && at.is_in(&piece.numbers[..=D])
+        };
+        let mut own = pieces.iter().position(holds).ok_or(End::Stagnation)?;
+        for _ in 0..STILL {
+            if line.cells.len() >= self.limit {
+                return Err(End::Limit);
+            }
+            let piece = &pieces[own];
+            let weights = at.seen_from(&piece.numbers);
+            let exit = exit(&piece.fluxes, &weights, D + 1).ok_or(End::Stagnation)?;
+            let time = exit.time * D as f64 * piece.measure * self.porosity.of(cell as usize);
+            push(line, piece.place(&exit.weights), time, cell);
+            *at = At { numbers: piece.numbers, weights: exit.weights };
+            match piece.beyond[exit.opposite] {
+                Beyond::Facet(facet) => return Ok(facet),
+                Beyond::Piece(next) => own = next as usize,
+                Beyond::Nothing => return Err(End::Stagnation),
+            }
+        }
+        Err(End::Stagnation)
+    }
+}
+
+/// A place by barycentric coordinates of numbered corners.
+struct At {
+    numbers: [u32; 4],
+    weights: Corners,
+}
+
+impl At {
+    /// Whether all corners that the place depends on are among the numbers.
+    fn is_in(&self, numbers: &[u32]) -> bool {
+        let corners = self.numbers.iter().zip(&self.weights);
+        corners.filter(|(_, weight)| **weight > 0.0).all(|(number, _)| numbers.contains(number))
+    }
+
+    /// The coordinates for the corners of another piece that holds the place.
+    fn seen_from(&self, numbers: &[u32; 4]) -> Corners {
+        let weight = |number: u32| {
+            let at = self.numbers.iter().position(|&own| own == number);
+            at.map_or(0.0, |at| self.weights[at])
+        };
+        numbers.map(weight)
+    }
+}
+
+/// Adds a point, unless the line is there already.
+fn push<const D: usize>(line: &mut Streamline<D>, point: Point<D>, time: f64, cell: u32) {
+    let last = line.times.len() - 1;
+    if line.points[last] == point {
+        line.times[last] += time;
+        return;
+    }
+    line.times.push(line.times[last] + time);
+    line.points.push(point);
+    line.cells.push(cell);
+}
