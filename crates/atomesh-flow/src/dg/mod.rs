@@ -9,12 +9,13 @@
 //! 2. what the source term, wells and the boundary bring is the right-hand side (`loads`); cells write their rows of
 //!    the matrix (`assemble`);
 //! 3. the equations are solved, with the continuous linear functions as the space of the smooth part (`coarse`);
-//! 4. fluxes are read off (`solution`).
+//! 4. fluxes are read off (`solution`), and what solving left unbalanced is sent away (`balance`).
 //!
 //! Assumes cells of positive measure, such as [`atomesh::mesh::Mesh::validate`] finds. Cost besides solving: O(cells).
 //! The same bits at any number of threads.
 
 mod assemble;
+mod balance;
 mod basis;
 mod coarse;
 mod element;

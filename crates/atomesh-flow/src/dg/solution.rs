@@ -3,6 +3,7 @@
 use atomesh::geometry::Point;
 use rayon::prelude::*;
 
+use super::balance::{Flows, balance};
 use super::basis::Basis;
 use super::element::Affine;
 use super::loads::place;
@@ -87,23 +88,26 @@ impl<const D: usize> DgSolution<D> {
 pub(super) fn conclude<const D: usize>(
     scheme: Scheme<'_, D>,
     mut coefficients: Vec<f64>,
-    mut sources: Vec<f64>,
+    sources: Vec<f64>,
     solve: SolveReport,
 ) -> Result<DgSolution<D>, FlowError> {
     let grid = scheme.grid;
     let count = scheme.element.count();
     let facets = (0..grid.facets().len()).into_par_iter();
     let fluxes = facets.map(|facet| scheme.flux(facet, &coefficients)).collect();
-    let mut rates = vec![0.0; scheme.setting.wells().len()];
+    let rates = vec![0.0; scheme.setting.wells().len()];
+    let mut flows = Flows { fluxes, sources, rates };
     for well in &scheme.pressure_wells {
         let share = |cell: u32| grid.measures()[cell as usize] / well.measure;
         let mean: f64 =
             well.cells.iter().map(|&c| share(c) * coefficients[c as usize * count]).sum();
-        rates[well.well] = well.index * (well.pressure - mean);
+        flows.rates[well.well] = well.index * (well.pressure - mean);
         for &cell in &well.cells {
-            sources[cell as usize] += share(cell) * rates[well.well];
+            flows.sources[cell as usize] += share(cell) * flows.rates[well.well];
         }
     }
+    balance(&scheme, &mut flows);
+    let Flows { fluxes, sources, rates } = flows;
     for (cell, own) in coefficients.chunks_exact_mut(count).enumerate() {
         own[0] += scheme.reference(cell);
     }

@@ -4,6 +4,8 @@ use atomesh::geometry::{Bounds, Point};
 use atomesh::mesh::{Delaunay, Mesh};
 use atomesh::voronoi::voronoi;
 use atomesh::watch::Silent;
+use rand::{RngExt, SeedableRng};
+use rand_pcg::Pcg64;
 
 use super::super::*;
 use super::SCHEMES;
@@ -77,6 +79,80 @@ fn is_symmetric_and_definite<const D: usize>(delaunay: Delaunay<D>, orders: &[us
 fn the_penalty_needs_no_tuning_whatever_the_permeability() {
     is_symmetric_and_definite(Delaunay::<2>::new(), &[1, 2, 3]);
     is_symmetric_and_definite(Delaunay::<3>::new(), &[1]);
+}
+
+fn fluxes_are_those_of_the_equations<const D: usize>(delaunay: Delaunay<D>, scheme: (Form, usize)) {
+    let mut grid = unit_box(delaunay, 3, 0.3, 2);
+    let mut problem = everything(&mut grid);
+    let field = |x: &Point<D>| 5.0 + x[0] - 3.0 * x[1];
+    let condition = Condition::Flux(Value::Field(&field));
+    problem.boundaries.push(Boundary { group: "ymax".to_string(), condition });
+    problem.boundaries[0].condition = Condition::Pressure(Value::Field(&field));
+    problem.source = Some(Value::Field(&field));
+    let barriers = std::mem::take(&mut problem.barriers);
+    problem.barriers = barriers.into_iter().filter(|b| b.multiplier > 0.0).collect();
+    let setting = Setting::new(&problem, &grid).unwrap();
+    let options = DgOptions { form: scheme.0, order: scheme.1, ..DgOptions::default() };
+    let scheme = Scheme::new(&grid, &setting, &options).unwrap();
+    let (loads, matrix) = (loads::loads(&scheme), matrix(&grid, &setting, &options));
+    let mut random = Pcg64::seed_from_u64(1);
+    let any: Vec<f64> = loads.rhs.iter().map(|_| random.random_range(-1.0..1.0)).collect();
+    let count = scheme.element.count();
+    let means = |cell: u32| any[cell as usize * count];
+    let mut excess = loads.sources.clone();
+    for well in &scheme.pressure_wells {
+        let share = |cell: u32| grid.measures()[cell as usize] / well.measure;
+        let mean: f64 = well.cells.iter().map(|&cell| share(cell) * means(cell)).sum();
+        for &cell in &well.cells {
+            excess[cell as usize] += share(cell) * well.index * (well.pressure - mean);
+        }
+    }
+    for (number, facet) in grid.facets().iter().enumerate() {
+        let flux = scheme.flux(number, &any);
+        excess[facet.cell as usize] -= flux;
+        if let Some(other) = facet.neighbour {
+            excess[other as usize] += flux;
+        }
+    }
+    let largest = matrix.entries().fold(0.0_f64, |most, entry| most.max(entry.2.abs()));
+    let left = product(&matrix, &any);
+    for (cell, excess) in excess.into_iter().enumerate() {
+        let residual = loads.rhs[cell * count] - left[cell * count];
+        // rounding of sums of some hundred terms
+        assert!((residual - excess).abs() <= 1e-13 * largest, "{D}-D: {residual} {excess}");
+    }
+}
+
+#[test]
+fn a_cells_equation_is_its_mass_balance_whatever_the_pressures() {
+    for scheme in SCHEMES {
+        fluxes_are_those_of_the_equations(Delaunay::<2>::new(), scheme);
+        fluxes_are_those_of_the_equations(Delaunay::<3>::new(), scheme);
+    }
+}
+
+#[test]
+fn cells_balance_where_little_flows_beside_what_could() {
+    let mut grid = unit_box(Delaunay::<2>::new(), 8, 0.2, 2);
+    name_inner_facets(&mut grid, "partly", |x| x[0] < 0.45);
+    let fixed = |group: &str, pressure: f64| Boundary {
+        group: group.to_string(),
+        condition: Condition::Pressure(Value::Constant(pressure)),
+    };
+    let k = |x: &Point<2>| if (0.4..0.6).contains(&x[0]) { 1e-9 } else { 10.0 };
+    let problem = Problem {
+        permeability: Permeability::Cells(grid.centroids().iter().map(k).collect()),
+        boundaries: vec![fixed("xmin", 1e3), fixed("xmax", 1e3 + 1.0)],
+        barriers: vec![Barrier { group: "partly".to_string(), multiplier: 1e-3 }],
+        ..Problem::default()
+    };
+    let setting = Setting::new(&problem, &grid).unwrap();
+    for (form, order) in SCHEMES {
+        let options = DgOptions { form, order, ..DgOptions::default() };
+        let solution = solve(&grid, &setting, &options, &mut Silent).unwrap().solution;
+        let balance = solution.balance(&grid);
+        assert!(balance.scale > 1e-12 && balance.relative_error() <= 1e-10, "{balance:?}");
+    }
 }
 
 fn a_constant_is_exact<const D: usize>(delaunay: Delaunay<D>, orders: &[(Form, usize)]) {
