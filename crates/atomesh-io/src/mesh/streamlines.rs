@@ -123,3 +123,74 @@ pub fn write_streamlines<const D: usize>(
     head.write(&mut file, watch)?;
     Ok(file.commit()?)
 }
+
+#[cfg(test)]
+mod tests {
+    use atomesh::watch::Silent;
+
+    use super::super::vtu::read::Document;
+    use super::*;
+
+    fn written(lines: &[Streamline<2>]) -> Result<Vec<u8>, MeshWriteError> {
+        let folder = tempfile::tempdir().unwrap();
+        let path = folder.path().join("lines.vtp");
+        let data = Streamlines { lines, frame: None, provenance: None };
+        let written = write_streamlines(&path, &data, &mut Silent);
+        assert_eq!(path.exists(), written.is_ok());
+        written.map(|()| std::fs::read(&path).unwrap())
+    }
+
+    #[test]
+    fn lines_are_read_as_they_were_written() {
+        let third = 1.0 / 3.0;
+        let (long, short) = ([[0.0, third], [1.0, 2.0], [4.0, -1.0]], [[5.0, 5.0], [6.0, 6.0]]);
+        let lines = [
+            Streamline {
+                points: &long,
+                times: &[0.0, third, 1e9],
+                pressures: &[3.0, 2.0, third],
+                from: Some(0),
+                to: None,
+            },
+            Streamline {
+                points: &short,
+                times: &[0.0, 2.0],
+                pressures: &[1.0, 0.0],
+                from: None,
+                to: Some(7),
+            },
+        ];
+        let bytes = written(&lines).unwrap();
+        assert_eq!(bytes, written(&lines).unwrap());
+        let document = Document::parse(&bytes, "PolyData").unwrap();
+        let piece = &document.pieces[0];
+        assert_eq!((piece.points, piece.counts), (5, [2, 0]));
+        let points = piece.coordinates[0].reals(15).unwrap();
+        let places = long.iter().chain(&short).flat_map(|p| [p[0], p[1], 0.0]);
+        assert_eq!(points, places.collect::<Vec<_>>());
+        let named = |name: &str| piece.point_data.iter().find(|array| array.name == name).unwrap();
+        assert_eq!(named("time_of_flight").reals(5).unwrap(), [0.0, third, 1e9, 0.0, 2.0]);
+        assert_eq!(named("pressure").reals(5).unwrap(), [3.0, 2.0, third, 1.0, 0.0]);
+        let wells = |name: &str| piece.cell_data.iter().find(|array| array.name == name).unwrap();
+        assert_eq!(wells("from").reals(2).unwrap(), [0.0, -1.0]);
+        assert_eq!(wells("to").reals(2).unwrap(), [-1.0, 7.0]);
+        let named = |name: &str| piece.lines.iter().find(|array| array.name == name).unwrap();
+        assert_eq!(named("offsets").indices(2).unwrap(), [3, 5]);
+        assert_eq!(named("connectivity").indices(5).unwrap(), [0, 1, 2, 3, 4]);
+    }
+
+    #[test]
+    fn no_lines_are_a_file_and_what_does_not_fit_is_refused() {
+        let bytes = written(&[]).unwrap();
+        assert_eq!(Document::parse(&bytes, "PolyData").unwrap().pieces[0].counts, [0, 0]);
+        let line =
+            Streamline { points: &[[0.0; 2]], times: &[0.0], pressures: &[], from: None, to: None };
+        written(&[line]).unwrap();
+        let error = written(&[Streamline { times: &[], ..line }]).unwrap_err();
+        let expected = "field \"time_of_flight\" has 0 values for 1 points or cells";
+        assert_eq!(error.to_string(), expected);
+        let other = Streamline { pressures: &[1.0], ..line };
+        let error = written(&[line, other]).unwrap_err();
+        assert!(error.to_string().starts_with("field \"pressure\" has 0 values"), "{error}");
+    }
+}
