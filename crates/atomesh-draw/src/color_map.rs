@@ -4,7 +4,7 @@
 use crate::Color;
 
 /// The colours that a map is cut into, so that shapes of one colour can be drawn together.
-const LEVELS: usize = 64;
+pub(crate) const LEVELS: usize = 64;
 
 /// Colours from the least to the greatest number, evenly spaced.
 #[derive(Clone, Copy, Debug)]

@@ -1,4 +1,4 @@
-//! The few letters that name slices, as strokes: no font is needed, and PNG and SVG agree.
+//! The few letters that name slices and colours, and digits, as strokes: no font is needed, and PNG and SVG agree.
 
 use crate::picture::{Place, Rect, Shape};
 
@@ -10,6 +10,16 @@ const WIDTH: f64 = 0.7 * HEIGHT;
 const ADVANCE: f64 = WIDTH + 4.0;
 const MARGIN: f64 = 6.0;
 
+/// The strokes that most letters share.
+const TOP: [Place; 2] = [[0.0, 0.0], [1.0, 0.0]];
+const MIDDLE: [Place; 2] = [[0.0, 0.5], [1.0, 0.5]];
+const BOTTOM: [Place; 2] = [[0.0, 1.0], [1.0, 1.0]];
+const LEFT_UP: [Place; 2] = [[0.0, 0.0], [0.0, 0.5]];
+const LEFT_DOWN: [Place; 2] = [[0.0, 0.5], [0.0, 1.0]];
+const RIGHT_UP: [Place; 2] = [[1.0, 0.0], [1.0, 0.5]];
+const RIGHT_DOWN: [Place; 2] = [[1.0, 0.5], [1.0, 1.0]];
+const SLOPES: [[Place; 2]; 2] = [[[0.0, 0.0], [0.5, 0.5]], [[0.5, 0.5], [1.0, 0.0]]];
+
 /// The strokes of a letter in a unit square, y down.
 fn strokes(letter: char) -> &'static [[Place; 2]] {
     match letter {
@@ -17,8 +27,38 @@ fn strokes(letter: char) -> &'static [[Place; 2]] {
         'Y' => &[[[0.0, 0.0], [0.5, 0.5]], [[0.5, 0.5], [1.0, 0.0]], [[0.5, 0.5], [0.5, 1.0]]],
         'Z' => &[[[0.0, 0.0], [1.0, 0.0]], [[1.0, 0.0], [0.0, 1.0]], [[0.0, 1.0], [1.0, 1.0]]],
         '-' => &[[[0.2, 0.5], [0.8, 0.5]]],
+        '.' => &[[[0.4, 1.0], [0.5, 1.0]]],
+        '0' => &[TOP, BOTTOM, LEFT_UP, LEFT_DOWN, RIGHT_UP, RIGHT_DOWN],
+        '1' => &[[[0.2, 0.2], [0.5, 0.0]], [[0.5, 0.0], [0.5, 1.0]]],
+        '2' => &[TOP, RIGHT_UP, MIDDLE, LEFT_DOWN, BOTTOM],
+        '3' => &[TOP, RIGHT_UP, MIDDLE, RIGHT_DOWN, BOTTOM],
+        '4' => &[LEFT_UP, MIDDLE, RIGHT_UP, RIGHT_DOWN],
+        '5' | 'S' => &[TOP, LEFT_UP, MIDDLE, RIGHT_DOWN, BOTTOM],
+        '6' => &[TOP, LEFT_UP, LEFT_DOWN, BOTTOM, RIGHT_DOWN, MIDDLE],
+        '7' => &[TOP, [[1.0, 0.0], [0.4, 1.0]]],
+        '8' => &[TOP, MIDDLE, BOTTOM, LEFT_UP, LEFT_DOWN, RIGHT_UP, RIGHT_DOWN],
+        '9' => &[MIDDLE, LEFT_UP, TOP, RIGHT_UP, RIGHT_DOWN, BOTTOM],
+        'E' => &[TOP, MIDDLE, BOTTOM, LEFT_UP, LEFT_DOWN],
+        'I' => &[[[0.5, 0.0], [0.5, 1.0]]],
+        'M' => &[LEFT_UP, LEFT_DOWN, RIGHT_UP, RIGHT_DOWN, SLOPES[0], SLOPES[1]],
+        'P' => &[TOP, MIDDLE, LEFT_UP, LEFT_DOWN, RIGHT_UP],
+        'R' => &[TOP, MIDDLE, LEFT_UP, LEFT_DOWN, RIGHT_UP, [[0.5, 0.5], [1.0, 1.0]]],
+        'T' => &[TOP, [[0.5, 0.0], [0.5, 1.0]]],
+        'U' => &[LEFT_UP, LEFT_DOWN, BOTTOM, RIGHT_UP, RIGHT_DOWN],
         _ => &[],
     }
+}
+
+/// The strokes of letters of a height, narrower than those of labels, from an upper left corner on.
+pub(crate) fn lettering(text: &str, corner: Place, height: f64) -> Vec<[Place; 2]> {
+    let (width, advance) = (0.5 * height, 0.82 * height);
+    let of = |(i, letter): (usize, char)| {
+        let place = move |p: Place| {
+            [corner[0] + i as f64 * advance + p[0] * width, corner[1] + p[1] * height]
+        };
+        strokes(letter).iter().map(move |stroke| stroke.map(place))
+    };
+    text.chars().enumerate().flat_map(of).collect()
 }
 
 /// A white box with black letters (X, Y, Z, -) in the upper right corner of `panel`.

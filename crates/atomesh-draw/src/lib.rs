@@ -3,7 +3,7 @@
 //! [`draw_flat`] lays a triangular mesh over its image, as in figure 2 of Hale (2001), or atoms over a
 //! field, as in his figure 5; [`draw_slices`] lays the cuts of a tetrahedral mesh over the three
 //! orthogonal slices of its image, as in his figure 9; [`draw_polygons`] and [`draw_polyhedra`] do the same for
-//! Voronoi cells. All return a [`Picture`], a list of what to draw and where, which becomes PNG or SVG;
+//! Voronoi cells. [`draw_flow`] and [`draw_flow_slices`] show what flows on either. All return a [`Picture`], a list of what to draw and where, which becomes PNG or SVG;
 //! [`ReportPage`] is a report with its pictures as one HTML file. The same input gives the same bytes.
 //!
 //! Meshes are given in *sample coordinates*: lattice coordinates divided by the grid's step. Row 0 is
@@ -15,6 +15,7 @@ mod error;
 mod flat;
 mod flow;
 mod label;
+mod legend;
 mod page;
 mod picture;
 mod png_encode;

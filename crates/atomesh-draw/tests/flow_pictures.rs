@@ -158,6 +158,21 @@ fn pressures_fill_cells_from_dark_to_light() {
 }
 
 #[test]
+fn a_legend_makes_the_picture_wider_where_colours_mean_something() {
+    let mesh = squares(2);
+    let pressures: Vec<f64> = (0..8).map(f64::from).collect();
+    let bare = FlowPicture::new(FlowCells::Simplices(&mesh));
+    let coloured = FlowPicture { pressures: &pressures, ..bare };
+    let width = |flow: &FlowPicture<2>, legend: bool| {
+        let style = FlowStyle { legend, ..FlowStyle::default() };
+        draw_flow(flow, &Style::default(), &style).unwrap().width()
+    };
+    assert_eq!(width(&bare, true), width(&bare, false));
+    assert_eq!(width(&coloured, false), width(&bare, true));
+    assert!(width(&coloured, true) > width(&coloured, false) + 50);
+}
+
+#[test]
 fn slices_have_a_vector_in_each_part_of_a_cell_and_wells_of_two_sizes() {
     let mesh = cube(20.0);
     let velocities = vec![[1.0, 2.0, 3.0]; mesh.cell_count()];

@@ -7,6 +7,7 @@ use super::sheet::{Looks, Mark, PRESSURE_CUT, Sheet, TIME_CUT, Tile};
 use super::{FlowCells, FlowPicture, FlowStyle};
 use crate::color_map::Range;
 use crate::flat::{median, scale};
+use crate::legend::put_beside;
 use crate::picture::{Picture, Place, Rect, Shape};
 use crate::raster::Ramp;
 use crate::{DrawError, Style};
@@ -58,6 +59,7 @@ pub fn draw_flow(
         longest: length * flow_style.longest_vector,
     };
     picture.shapes.extend(canvas.sheet(flow).shapes(&looks, &along));
+    put_beside(&mut picture, &looks.bars());
     Ok(picture)
 }
 

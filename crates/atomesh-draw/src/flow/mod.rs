@@ -156,11 +156,19 @@ pub struct FlowStyle {
     /// The least distance in pixels between two vectors' middles: of cells nearer to each other the larger ones'
     /// are drawn. Default 7.
     pub vector_spacing: f64,
+    /// Whether bars to the right say what colours stand for. Default true.
+    pub legend: bool,
 }
 
 impl Default for FlowStyle {
     fn default() -> Self {
-        Self { barrier_width: 4.0, vector_length: 1.0, longest_vector: 1.5, vector_spacing: 7.0 }
+        Self {
+            barrier_width: 4.0,
+            vector_length: 1.0,
+            longest_vector: 1.5,
+            vector_spacing: 7.0,
+            legend: true,
+        }
     }
 }
 

@@ -5,6 +5,7 @@ use std::f64::consts::TAU;
 use super::arrow::{Vector, outline, thinned};
 use super::{FlowStyle, clip};
 use crate::color_map::{PLASMA, Range, VIRIDIS};
+use crate::legend::Bar;
 use crate::picture::{Place, Rect, Shape};
 use crate::{Color, Style};
 
@@ -64,6 +65,16 @@ pub(super) struct Looks<'a> {
     pub time: Option<Range>,
     /// The longest vector in pixels.
     pub longest: f64,
+}
+
+impl Looks<'_> {
+    /// What the colours stand for.
+    pub fn bars(&self) -> Vec<Bar> {
+        let pressure = self.pressure.map(|range| Bar { name: "PRESSURE", map: VIRIDIS, range });
+        let time = self.time.map(|range| Bar { name: "TIME", map: PLASMA, range });
+        let bars = [pressure, time].into_iter().flatten();
+        bars.filter(|_| self.flow.legend).collect()
+    }
 }
 
 /// The share of cells at each end of the range of pressures that have its last colour: wells' are extreme.

@@ -10,6 +10,7 @@ use super::{FlowCells, FlowPicture, FlowStyle};
 use crate::color_map::Range;
 use crate::flat::{LOOKS, median, scale, typical_length};
 use crate::label::label;
+use crate::legend::put_beside;
 use crate::picture::{Picture, Place, Rect, Shape};
 use crate::raster::Ramp;
 use crate::slices::{CROSS_HAIR, GAP, Level, PLANES, Plane, unique};
@@ -38,7 +39,7 @@ pub fn draw_flow_slices(
         dot(&v, &v).sqrt()
     };
     let brisk = brisk(flow.velocities.iter().map(speed));
-    let length = flow_style.vector_length * scene.edge_pixels;
+    let length = flow_style.vector_length * scene.edge_pixels / LARGER;
     let share = if brisk > 0.0 { length / brisk } else { 0.0 };
     let times = flow.lines.iter().flat_map(|line| line.times).copied();
     let looks = Looks {
@@ -64,6 +65,7 @@ pub fn draw_flow_slices(
         picture.shapes.extend(panel.cross_hair());
         picture.shapes.extend(label(plane.name, &panel.rect));
     }
+    put_beside(&mut picture, &looks.bars());
     Ok(picture)
 }
 
@@ -129,7 +131,8 @@ impl<'a> Scene<'a> {
     }
 }
 
-/// How much larger cells are drawn than the style says: slices show parts of cells, with a vector in each.
+/// How much larger cells are drawn than the style says, and their parts in slices smaller than cells: there is a
+/// vector in each part.
 const LARGER: f64 = 1.5;
 
 /// The median length of edges of tetrahedra, or from site to site of Voronoi cells.
