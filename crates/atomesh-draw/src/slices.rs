@@ -210,7 +210,7 @@ pub(crate) struct Level {
 }
 
 impl Level {
-    fn is_below(&self, x: f64) -> bool {
+    pub fn is_below(&self, x: f64) -> bool {
         if self.own_is_above { x < self.value } else { x <= self.value }
     }
 

@@ -237,7 +237,12 @@ impl Panel<'_> {
         };
         let polygon = |cell: usize| match self.scene.flow.cells {
             FlowCells::Simplices(mesh) => {
-                let corners = self.scene.corners(&mesh.corners()[4 * cell..4 * cell + 4]);
+                let corners: [Point<3>; 4] =
+                    [0, 1, 2, 3].map(|k| mesh.points()[mesh.corners()[4 * cell + k] as usize]);
+                let below = corners.map(|p| level.is_below(p[self.plane.normal]));
+                if below == [below[0]; 4] {
+                    return Vec::new(); // as most cells
+                }
                 cut(&mut (0..4).map(|off| [1, 2, 3].map(|k| corners[(off + k) % 4]).to_vec()))
             }
             FlowCells::Polytopes(mesh) => {
