@@ -3,6 +3,7 @@
 pub mod check;
 pub mod completions;
 pub mod enhance;
+pub mod export;
 pub mod features;
 pub mod flow;
 pub mod info;

@@ -44,6 +44,22 @@ impl ConnectionFiles {
     }
 }
 
+/// How much flows, for the lists that say it.
+#[derive(Clone, Copy, Debug)]
+pub struct Flow<'a> {
+    /// The permeability of each cell.
+    pub permeability: &'a [f64],
+    /// The transmissibility of each face between two cells.
+    pub transmissibilities: &'a [f64],
+}
+
+/// A list being written.
+struct List<'a, const D: usize> {
+    data: &'a CellData<'a, D>,
+    flow: Option<Flow<'a>>,
+    files: &'a ConnectionFiles,
+}
+
 /// Writes the list. All files appear only when all are written.
 ///
 /// # Errors
@@ -53,12 +69,29 @@ pub fn write_connections<const D: usize>(
     data: &CellData<D>,
     watch: &mut dyn Watch,
 ) -> Result<(), MeshWriteError> {
+    write_list(&List { data, flow: None, files }, watch)
+}
+
+/// Writes the list with permeability and transmissibilities, each in a last column.
+///
+/// # Errors
+/// If a file cannot be written, or the watch ends the work.
+pub fn write_connections_with_flow<const D: usize>(
+    files: &ConnectionFiles,
+    data: &CellData<D>,
+    flow: Flow,
+    watch: &mut dyn Watch,
+) -> Result<(), MeshWriteError> {
+    write_list(&List { data, flow: Some(flow), files }, watch)
+}
+
+fn write_list<const D: usize>(list: &List<D>, watch: &mut dyn Watch) -> Result<(), MeshWriteError> {
     let mut finished = Vec::new();
-    let texts: [fn(&CellData<D>, &ConnectionFiles) -> String; 4] = [head, cells, inner, boundary];
-    for (n, (path, text)) in files.paths().into_iter().zip(texts).enumerate() {
+    let texts: [fn(&List<D>) -> String; 4] = [head, cells, inner, boundary];
+    for (n, (path, text)) in list.files.paths().into_iter().zip(texts).enumerate() {
         check(watch, Phase::Write, n as f64 / 4.0, None)?;
         let mut file = AtomicFile::create(path)?;
-        file.write_all(text(data, files).as_bytes())?;
+        file.write_all(text(list).as_bytes())?;
         finished.push(file);
     }
     let committed: io::Result<Vec<()>> = finished.into_iter().map(AtomicFile::commit).collect();
@@ -81,50 +114,73 @@ pub(in super::super) fn put(text: &mut String, numbers: &[f64]) {
     }
 }
 
-fn cells<const D: usize>(data: &CellData<D>, _: &ConnectionFiles) -> String {
-    let mesh = data.mesh;
-    let mut text = format!("cell,{},volume,{}\n", vector::<D>("site"), vector::<D>("center"));
+/// The name of a column that a list with flow has, after a comma.
+fn column<const D: usize>(list: &List<D>, name: &str) -> String {
+    list.flow.map_or_else(String::new, |_| format!(",{name}"))
+}
+
+fn cells<const D: usize>(list: &List<D>) -> String {
+    let mesh = list.data.mesh;
+    let more = column(list, "permeability");
+    let mut text = format!("cell,{},volume,{}{more}\n", vector::<D>("site"), vector::<D>("center"));
     for cell in 0..mesh.cell_count() {
         let _ = write!(text, "{cell}");
         put(&mut text, &mesh.sites()[cell]);
         put(&mut text, &[mesh.measures()[cell]]);
         put(&mut text, &mesh.centroids()[cell]);
+        put(&mut text, list.flow.map_or(&[], |flow| &flow.permeability[cell..=cell]));
         text.push('\n');
     }
     text
 }
 
-fn inner<const D: usize>(data: &CellData<D>, _: &ConnectionFiles) -> String {
+fn inner<const D: usize>(list: &List<D>) -> String {
+    let more = column(list, "transmissibility");
     let (normal, face) = (vector::<D>("normal"), vector::<D>("face"));
     let mut text = format!(
-        "cell_i,cell_j,area,distance_i,distance_j,{normal},{face},geometry,orthogonality,feature\n"
+        "cell_i,cell_j,area,distance_i,distance_j,{normal},{face},geometry,orthogonality,feature{more}\n"
     );
-    for (connection, feature) in connections(data.mesh).iter().zip(&data.features.of_faces) {
+    let faces = connections(list.data.mesh);
+    for (face, (connection, feature)) in faces.iter().zip(&list.data.features.of_faces).enumerate()
+    {
         let _ = write!(text, "{},{}", connection.cells[0], connection.cells[1]);
         put(&mut text, &[connection.area]);
         put(&mut text, &connection.distances);
         put(&mut text, &connection.normal);
         put(&mut text, &connection.centroid);
         put(&mut text, &[connection.geometry(), connection.orthogonality]);
-        let _ = writeln!(text, ",{feature}");
-    }
-    text
-}
-
-fn boundary<const D: usize>(data: &CellData<D>, _: &ConnectionFiles) -> String {
-    let (normal, face) = (vector::<D>("normal"), vector::<D>("face"));
-    let mut text = format!("cell,side,area,distance,{normal},{face}\n");
-    for side in boundary_connections(data.mesh) {
-        let _ = write!(text, "{},{}", side.cell, side_name(side.side));
-        put(&mut text, &[side.area, side.distance]);
-        put(&mut text, &side.normal);
-        put(&mut text, &side.centroid);
+        let _ = write!(text, ",{feature}");
+        put(&mut text, list.flow.map_or(&[], |flow| &flow.transmissibilities[face..=face]));
         text.push('\n');
     }
     text
 }
 
-fn head<const D: usize>(data: &CellData<D>, files: &ConnectionFiles) -> String {
+fn boundary<const D: usize>(list: &List<D>) -> String {
+    let more = column(list, "transmissibility");
+    let (normal, face) = (vector::<D>("normal"), vector::<D>("face"));
+    let mut text = format!("cell,side,area,distance,{normal},{face}{more}\n");
+    for side in boundary_connections(list.data.mesh) {
+        let _ = write!(text, "{},{}", side.cell, side_name(side.side));
+        put(&mut text, &[side.area, side.distance]);
+        put(&mut text, &side.normal);
+        put(&mut text, &side.centroid);
+        match list.flow {
+            // the site is the side
+            Some(_) if side.distance == 0.0 => text.push(','),
+            Some(flow) => {
+                let k = flow.permeability[side.cell as usize];
+                put(&mut text, &[k * side.area / side.distance]);
+            }
+            None => {}
+        }
+        text.push('\n');
+    }
+    text
+}
+
+fn head<const D: usize>(list: &List<D>) -> String {
+    let (data, files) = (list.data, list.files);
     let mesh = data.mesh;
     let name = |path: &Path| path.file_name().unwrap_or_default().to_string_lossy().into_owned();
     let measure = if D == 2 { "area" } else { "volume" };
@@ -133,7 +189,7 @@ fn head<const D: usize>(data: &CellData<D>, files: &ConnectionFiles) -> String {
     let features: Vec<_> = (data.features.areas.iter().enumerate())
         .map(|(n, area)| json!({ "id": n + 1, "name": format!("feature{}", n + 1), "area": area }))
         .collect();
-    let text = json!({
+    let mut text = json!({
         "format": "atomesh connections",
         "format_version": 1,
         "dimension": D,
@@ -160,5 +216,9 @@ fn head<const D: usize>(data: &CellData<D>, files: &ConnectionFiles) -> String {
         "features": features,
         "metadata": metadata,
     });
+    if list.flow.is_some() {
+        text["columns"]["permeability"] = "k of the cell".into();
+        text["columns"]["transmissibility"] = "what flows for a unit of pressure: multiplier · area / (distance_i/k_i + distance_j/k_j), k · area / distance to a side; nothing where a site lies on the side, whose pressure is then the cell's".into();
+    }
     format!("{text:#}\n")
 }

@@ -1,13 +1,19 @@
-//! Files of polygons and polyhedra: VTU, OpenFOAM's polyMesh, and lists of connections.
+//! Files of polygons and polyhedra: VTU, OpenFOAM's polyMesh, lists of connections, and MODFLOW's grids.
 //!
 //! All hold world coordinates, and name cells, faces and points from 0 on in the mesh's order, so that a cell of
 //! one file is the cell of that number in the others.
 
 pub(super) mod connections;
 mod foam;
+mod modflow;
+mod read;
+mod table;
 
-pub use connections::{ConnectionFiles, write_connections};
+pub use connections::{ConnectionFiles, Flow, write_connections, write_connections_with_flow};
 pub use foam::poly_mesh_of;
+pub use modflow::{ModflowFiles, Rock, write_modflow};
+pub(crate) use read::RawCells;
+pub use read::{AnyCells, CellReadError, LoadedCells, read_cells};
 
 use atomesh::image::Frame;
 use atomesh::voronoi::{FeatureFaces, PolyMesh};

@@ -49,7 +49,7 @@ pub(crate) struct Piece<'a> {
     pub lines: Vec<Array<'a>>,
     pub polygons: Vec<Array<'a>>,
     pub counts: [usize; 2],
-    topology: Vec<Array<'a>>,
+    pub topology: Vec<Array<'a>>,
     /// The names of the point and cell arrays that are shown first, if the file says so.
     pub scalars: [Option<&'a str>; 2],
     pub point_data: Vec<Array<'a>>,
