@@ -2,8 +2,7 @@
 //! the difference of the two pressures beside it.
 //!
 //! Faces of Voronoi cells stand at right angles to the lines between sites, so that for isotropic permeability the
-//! flux of a linear pressure is exact, whatever the cells look like (Heinrich 1987; PEBI cells: Heinemann et al.
-//! 1991). In order:
+//! flux of a linear pressure is exact, whatever the cells look like (Heinemann et al. 1991). In order:
 //!
 //! 1. `transmissibility`: of each face between two cells, with k on either side and the multiplier of a barrier;
 //! 2. `boundary`: what holds on faces on sides of the box. A site on a side *is* the boundary: where the pressure is
