@@ -97,6 +97,12 @@ impl<const D: usize> Lattice<D> {
         freedom
     }
 
+    /// The lattice without some of its atoms.
+    pub(crate) fn retained(self, keep: impl Fn(usize) -> bool) -> Self {
+        let kept: Vec<u32> = (0..self.len()).filter(|&i| keep(i)).map(|i| i as u32).collect();
+        self.reordered(&kept)
+    }
+
     /// The same lattice with its atoms elsewhere.
     pub(crate) fn moved_to(mut self, atoms: Vec<Point<D>>) -> Self {
         assert_eq!(atoms.len(), self.atoms.len());

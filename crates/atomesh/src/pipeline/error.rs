@@ -7,6 +7,7 @@ use crate::improve::ImproveError;
 use crate::lattice::LatticeError;
 use crate::measure::MeasureError;
 use crate::mesh::ConnectError;
+use crate::mirror::MirrorError;
 use crate::optimize::OptimizeError;
 use crate::potential::PotentialError;
 use crate::region::RegionError;
@@ -129,6 +130,16 @@ macro_rules! from {
     };
 }
 from!(LatticeError => Lattice, OptimizeError => Optimize, ConnectError => Connect, RegionError => Region, SampleError => Sample, ImproveError => Improve, FeaturesError => Features, VoronoiError => Voronoi, MeasureError => Measure);
+
+impl From<MirrorError> for PipelineError {
+    fn from(error: MirrorError) -> Self {
+        match error {
+            MirrorError::Lattice(error) => Self::Lattice(error),
+            MirrorError::Optimize(error) => Self::Optimize(error),
+            MirrorError::Cancelled(cancelled) => Self::Cancelled(cancelled),
+        }
+    }
+}
 
 /// What is odd but no error.
 #[derive(Clone, Debug, PartialEq, serde::Serialize, thiserror::Error)]

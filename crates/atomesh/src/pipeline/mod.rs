@@ -42,6 +42,7 @@ use crate::lattice::{
     GrowOptions, Lattice, Outlined, Place, ScatterOptions, fill_holes, grow_within, scatter, settle,
 };
 use crate::mesh::{Mesh, merge_duplicates};
+use crate::mirror::{MirrorReport, Mirrored, crests, mirror};
 use crate::optimize::{EngineKind, Fields, OptimizeReport, optimize};
 use crate::potential::{ImagePotential, ImageWeight, Interpolation};
 use crate::region::{
@@ -277,7 +278,10 @@ impl<const D: usize> Prepared<'_, D> {
         let field = self.options.optimize.engine == EngineKind::Sampled;
         let spline = self.options.interpolation == Interpolation::Spline;
         let smooth = self.options.optimize.smoothing_steps > 0;
-        let copies = [field, spline, smooth, smooth && spline].into_iter().filter(|&c| c).count();
+        // looking for crests takes two volumes and a copy of the potential
+        let mirrored = self.is_mirrored() && self.potential.range().1 > 0.0;
+        let copies = [field, spline, smooth, smooth && spline, mirrored, mirrored, mirrored];
+        let copies = copies.into_iter().filter(|&c| c).count();
         Estimate::new::<D>(self.grid.sample_count(), atoms, 1 + copies)
     }
 
@@ -433,6 +437,32 @@ impl<const D: usize> Prepared<'_, D> {
         Fields { potential: &self.potential, weight: &self.weight, distance: &self.distance }
     }
 
+    /// Whether pairs of atoms are made where features repel.
+    fn is_mirrored(&self) -> bool {
+        self.is_voronoi() && self.options.mirror && self.outline.is_none()
+    }
+
+    /// The atoms where they end, how they were moved, and what became of features that repel.
+    fn settled(
+        &self,
+        lattice: Lattice<D>,
+        watch: &mut dyn Watch,
+    ) -> Result<(Lattice<D>, OptimizeReport, Option<MirrorReport>), PipelineError> {
+        let options = &self.options.optimize;
+        let crests = if self.is_mirrored() { crests(self.fields(), watch)? } else { Vec::new() };
+        if !crests.is_empty() {
+            let how = (self.method.scatterer(), options);
+            let Mirrored { lattice, report, optimize_report } =
+                mirror(lattice, &crests, self.fields(), how, watch)?;
+            return Ok((lattice, optimize_report, Some(report)));
+        }
+        if self.stays_as_grown() {
+            return Ok((lattice, OptimizeReport::new(options.engine), None));
+        }
+        let (lattice, report) = optimize(lattice, self.fields(), options, watch)?.into_parts();
+        Ok((lattice, report, None))
+    }
+
     /// Grows the lattice, moves the atoms, connects them, and improves the mesh.
     ///
     /// # Errors
@@ -445,12 +475,7 @@ impl<const D: usize> Prepared<'_, D> {
             let least = self.distance.least();
             return Err(PipelineError::Memory { needed: estimate.memory, available, least });
         }
-        let lattice = self.grow(watch)?;
-        let (lattice, report) = if self.stays_as_grown() {
-            (lattice, OptimizeReport::new(self.options.optimize.engine))
-        } else {
-            optimize(lattice, self.fields(), &self.options.optimize, watch)?.into_parts()
-        };
+        let (lattice, report, mirror_report) = self.settled(self.grow(watch)?, watch)?;
         let (mesh, freedom) = match &self.outline {
             Some(outline) => {
                 let trimmed = self.connect_within(lattice, outline, watch)?;
@@ -482,6 +507,7 @@ impl<const D: usize> Prepared<'_, D> {
             units: self.options.units,
             optimize_report: report,
             improve_report,
+            mirror_report,
             outline: self.outline,
             outline_facets,
             labels,

@@ -11,6 +11,7 @@ use crate::measure::{
     fidelity, precision, shape, spread,
 };
 use crate::mesh::{FacetGroup, Mesh, Quadratic, Regions, Tags, TagsError};
+use crate::mirror::MirrorReport;
 use crate::optimize::OptimizeReport;
 use crate::potential::ImagePotential;
 use crate::region::{Outline, interfaces};
@@ -33,6 +34,7 @@ pub struct Outcome<const D: usize> {
     pub(super) units: Units,
     pub(super) optimize_report: OptimizeReport,
     pub(super) improve_report: Option<ImproveReport>,
+    pub(super) mirror_report: Option<MirrorReport>,
     pub(super) outline: Option<Outline<D>>,
     pub(super) outline_facets: Vec<[u32; D]>,
     pub(super) labels: Option<Vec<i32>>,
@@ -217,6 +219,11 @@ impl<const D: usize> Outcome<D> {
     /// What was improved after connecting; `None` if nothing was asked for, or the dimension has no improver.
     pub fn improve_report(&self) -> Option<&ImproveReport> {
         self.improve_report.as_ref()
+    }
+
+    /// The pairs of atoms across features that repel; `None` if none were asked for or there are no such features.
+    pub fn mirror_report(&self) -> Option<&MirrorReport> {
+        self.mirror_report.as_ref()
     }
 
     /// Where the mesh ends, if a mask says so.

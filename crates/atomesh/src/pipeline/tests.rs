@@ -149,6 +149,7 @@ fn random_options<const D: usize>(random: &mut Pcg64, image: &Image<D>) -> MeshO
         ),
         mixture: None,
         kind: MeshKind::default(),
+        mirror: true,
         units,
         size: one_of(
             random,
@@ -193,7 +194,8 @@ fn meshes_or_refusals<const D: usize>(
     for seed in 0..count {
         let mut random = Pcg64::seed_from_u64(seed);
         let image = random_image::<D>(&mut random, greatest);
-        let options = MeshOptions { kind: mesh_kind, ..random_options(&mut random, &image) };
+        let mut options = MeshOptions { kind: mesh_kind, ..random_options(&mut random, &image) };
+        options.features.repel |= mesh_kind == MeshKind::Voronoi && seed % 2 == 0;
         let what = format!("{D}-D, seed {seed}: {:?} {options:?}", image.frame());
         let (kind, weight) = (options.lattice, options.image_weight);
         let (chosen, step) = (options.size, image.frame().grid(options.units).least_step());
