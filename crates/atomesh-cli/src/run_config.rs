@@ -194,6 +194,11 @@ section! {
         #[arg(long, value_name = "KIND",
             value_parser = named::<MeshKind>(&["delaunay", "voronoi"]))]
         pub mesh: MeshKind,
+        /// Put atoms in pairs, mirror images of each other in the features that repel, so that the faces of Voronoi
+        /// cells fall on these. Default: false; true with --mesh voronoi
+        #[arg(long, value_name = "BOOL", num_args = 0..=1, require_equals = true,
+            default_missing_value = "true")]
+        pub mirror: bool,
         /// Edge length wanted, in lattice units: one, as in 8, or from features to elsewhere, as in
         /// 6..18. Default: from the size of the image
         #[arg(long, value_name = "D | MIN..MAX", allow_hyphen_values = true)]
@@ -485,6 +490,7 @@ impl RunConfig {
         let mut defaults = Self {
             lattice: LatticeOptions {
                 mesh: Some(mesh.kind),
+                mirror: Some(mesh.mirror),
                 grade_by: Some(mesh.grade_by),
                 beta: Some(mesh.image_weight),
                 units: Some(mesh.units),
@@ -559,6 +565,7 @@ impl RunConfig {
             mixture: features.mixture(),
             interpolation: moves.interpolation.unwrap_or(default.interpolation),
             kind: default.kind,
+            mirror: lattice.mirror.unwrap_or(default.mirror),
             units: lattice.units.unwrap_or(default.units),
             size: lattice.wanted_size()?,
             grade_by: lattice.grade_by.unwrap_or(default.grade_by),

@@ -215,6 +215,7 @@ impl Job<'_> {
             "fidelity": figures.report.as_ref().map(|r| &r.fidelity),
             "optimizer": outcome.optimize_report(),
             "improve": outcome.improve_report(),
+            "mirror": outcome.mirror_report(),
             "seconds": seconds,
             "seconds_total": watch.elapsed().as_secs_f64(),
             "memory_peak_bytes": memory::peak(),

@@ -22,6 +22,8 @@
 mod error;
 mod estimate;
 mod method;
+#[cfg(test)]
+mod mirror_tests;
 mod options;
 mod outcome;
 #[cfg(test)]
