@@ -96,16 +96,10 @@ pub(super) fn interface<const D: usize>(
     options: &DgOptions,
     number: usize,
 ) -> Option<Interface<D>> {
-    let facet = &grid.facets()[number];
-    let multiplier = setting.multipliers()[number];
-    let condition = setting.condition(number);
-    let is_open = match facet.neighbour {
-        Some(_) => multiplier > 0.0,
-        None => matches!(condition, Some(Condition::Pressure(_))),
-    };
-    if !is_open {
+    if !is_open(grid, setting, number) {
         return None;
     }
+    let facet = &grid.facets()[number];
     let flank = |cell: u32| flank(grid, setting, &cells[cell as usize], options, (number, cell));
     let first = flank(facet.cell);
     let second = facet.neighbour.map(flank);
@@ -126,7 +120,7 @@ pub(super) fn interface<const D: usize>(
         sigma += penalty(second, 1.0 - weight);
         resistance += second.distance / second.permeability;
     }
-    resistance *= 1.0 / multiplier - 1.0;
+    resistance *= 1.0 / setting.multipliers()[number] - 1.0;
     let (slope_weight, jump_weight) = weights(options.form, 1.0 / sigma, resistance);
     Some(Interface {
         measure: facet.measure(),
@@ -137,6 +131,13 @@ pub(super) fn interface<const D: usize>(
         first: side(&first, weight, 1.0),
         second: second.map(|second| side(&second, 1.0 - weight, -1.0)),
     })
+}
+
+fn is_open<const D: usize>(grid: &Grid<D>, setting: &Setting<'_, D>, facet: usize) -> bool {
+    match grid.facets()[facet].neighbour {
+        Some(_) => setting.multipliers()[facet] > 0.0,
+        None => matches!(setting.condition(facet), Some(Condition::Pressure(_))),
+    }
 }
 
 /// a and b.

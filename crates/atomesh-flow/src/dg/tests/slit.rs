@@ -80,6 +80,12 @@ fn the_jump_across_a_slit_is_within_two_percent() {
 }
 
 #[test]
+fn the_default_order_does_more_with_fewer_unknowns() {
+    let linear = DgOptions { order: 1, ..DgOptions::default() };
+    assert!(jump_error(0.1, &DgOptions::default()) < jump_error(0.05, &linear));
+}
+
+#[test]
 fn the_jump_across_a_slit_is_best_with_the_default_penalty() {
     for order in [1, 2] {
         let error =
