@@ -16,7 +16,7 @@ use super::{Elimination, SolveError, Sparse};
 
 /// Bytes that factors take for each value of a Cholesky factor as counted, by measurement on meshes: with the rows'
 /// numbers and the space in which they are made, and twice as much without symmetry, where pivots add to it.
-const BYTES: (f64, f64) = (10.0, 40.0);
+const BYTES: (f64, f64) = (10.0, 24.0);
 
 /// A matrix as faer's arrays: read by columns it is the transpose.
 struct Arrays<'a> {

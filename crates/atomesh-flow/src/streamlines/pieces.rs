@@ -13,7 +13,7 @@ use crate::setting::Setting;
 use crate::solution::Solution;
 
 /// A flux below this share of the largest is rounding: no line follows it.
-const ROUNDING: f64 = 1e-15;
+const ROUNDING: f64 = 1e-13;
 
 /// The number of a corner that is a cell's centroid.
 pub const CENTROID: u32 = u32::MAX;

@@ -1,5 +1,7 @@
 //! Where lines start: around wells that bring something in, and on the boundary where something flows in.
 
+use std::f64::consts::TAU;
+
 use atomesh::geometry::{Point, Simplex, difference, dot};
 
 use super::TraceOptions;
@@ -143,7 +145,7 @@ fn middle<const D: usize>(field: &Field<'_, D>) -> Point<D> {
     })
 }
 
-/// In the plane counter-clockwise about a centre, also within a patch; in space as they are.
+/// In the plane counter-clockwise about a centre, also within a patch, from the widest gap on; in space as they are.
 fn order_around<const D: usize>(patches: &mut [Patch<D>], centre: &Point<D>) {
     if D != 2 {
         return;
@@ -155,6 +157,16 @@ fn order_around<const D: usize>(patches: &mut [Patch<D>], centre: &Point<D>) {
         way[1].atan2(way[0])
     };
     patches.sort_by(|a, b| angle(a).total_cmp(&angle(b)).then(a.facet.cmp(&b.facet)));
+    let gap = |at: usize| {
+        let before = if at == 0 {
+            angle(&patches[patches.len() - 1]) - TAU
+        } else {
+            angle(&patches[at - 1])
+        };
+        angle(&patches[at]) - before
+    };
+    let widest = (0..patches.len()).max_by(|&a, &b| gap(a).total_cmp(&gap(b)).then(b.cmp(&a)));
+    patches.rotate_left(widest.unwrap_or(0));
     for patch in patches {
         let [a, b] = [0, D - 1].map(|end| difference(&patch.points[end], centre));
         if a[0] * b[1] - a[1] * b[0] < 0.0 {

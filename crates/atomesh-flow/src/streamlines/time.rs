@@ -36,10 +36,12 @@ pub fn time_of_flight<const D: usize>(
         let (mut inward, mut sum) = (0.0, porosity.of(cell) * grid.measures()[cell]);
         for &facet in grid.facets_of(cell) {
             let flux = -field.out_of(cell, facet as usize);
-            if flux > 0.0 {
+            let upwind = field.beyond(cell, facet as usize);
+            let before = upwind.map_or(0.0, |upwind| times[upwind as usize]);
+            // what comes from where nothing flows is rounding
+            if flux > 0.0 && before.is_finite() {
                 inward += flux;
-                let upwind = field.beyond(cell, facet as usize);
-                sum += upwind.map_or(0.0, |upwind| flux * times[upwind as usize]);
+                sum += flux * before;
             }
         }
         let through = inward + solution.sources[cell].max(0.0);
