@@ -156,8 +156,8 @@ pub enum SolveError {
 
 /// Solves the equations; the same bits at any number of threads.
 ///
-/// [`Method::Auto`] takes factors in the plane, and in space while they take little work, as long as they fit into
-/// memory; and whichever way it takes first, the other if that fails.
+/// [`Method::Auto`] takes factors in the plane, in space while they take little work, and wherever blocks of several unknowns
+/// are not symmetric, as long as they fit into memory; else iteration, and factors after all where that fails.
 ///
 /// # Errors
 /// [`SolveError`].
@@ -183,19 +183,21 @@ pub fn solve<const D: usize>(
         Method::Direct => direct(system, &order(), options, watch),
         Method::Iterative => iterate(system, options, watch),
         Method::Auto => {
-            let order = system.may_be_direct().then(order).filter(|order| {
-                (D == 2 || order.work <= WORK)
-                    && Factors::bytes(order, system.is_symmetric) <= options.memory as f64
-            });
-            match order {
-                Some(order) => {
-                    direct(system, &order, options, watch).or_else(|error| match error {
-                        SolveError::Memory { .. } => iterate(system, options, watch),
-                        other => Err(other),
-                    })
-                }
-                None => iterate(system, options, watch),
+            let fits = |order: &Elimination| {
+                Factors::bytes(order, system.is_symmetric) <= options.memory as f64
+            };
+            let is_cheap =
+                |order: &Elimination| D == 2 || system.sweeps_may_fail() || order.work <= WORK;
+            let planned = system.may_be_direct().then(order);
+            if let Some(order) = planned.filter(|order| fits(order) && is_cheap(order)) {
+                return direct(system, &order, options, watch);
             }
+            let error = match iterate(system, options, watch) {
+                Err(error @ SolveError::NotConverged { .. }) => error,
+                other => return other,
+            };
+            let order = order();
+            if fits(&order) { direct(system, &order, options, watch) } else { Err(error) }
         }
     }
 }
@@ -218,7 +220,14 @@ impl<const D: usize> System<'_, D> {
     }
 
     fn may_be_direct(&self) -> bool {
-        D == 2 || self.rhs.len() <= MOST_IN_SPACE
+        let most = if self.sweeps_may_fail() { 10 * MOST_IN_SPACE } else { MOST_IN_SPACE };
+        D == 2 || self.rhs.len() <= most
+    }
+
+    /// Sweeps over blocks need the blocks on the diagonal to be positive definite. Those of Oden, Babuška and Baumann's form
+    /// are nearly skew, and iteration was seen to stall.
+    fn sweeps_may_fail(&self) -> bool {
+        !self.is_symmetric && self.block > 1
     }
 
     fn report(&self, method: &'static str, iterations: usize, residual: f64) -> SolveReport {
