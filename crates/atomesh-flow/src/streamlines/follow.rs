@@ -29,10 +29,8 @@ pub struct Tracer<'a, const D: usize> {
     sink_of: Vec<u32>,
 }
 
-/// A well's net rate and, out of and into its cells, what flows through the facets around them; the volume of
-/// their pores.
+/// What flows out of and into a well's cells through the facets around them, and the volume of their pores.
 pub struct WellCells {
-    pub rate: f64,
     pub outward: f64,
     pub inward: f64,
     pub pores: f64,
@@ -44,7 +42,7 @@ impl WellCells {
         cells: &[u32],
         porosity: &Porosity<'_>,
     ) -> Self {
-        let mut own = Self { rate: 0.0, outward: 0.0, inward: 0.0, pores: 0.0 };
+        let mut own = Self { outward: 0.0, inward: 0.0, pores: 0.0 };
         for &cell in cells {
             let cell = cell as usize;
             own.pores += porosity.of(cell) * field.grid.measures()[cell];
@@ -54,7 +52,6 @@ impl WellCells {
                     continue;
                 }
                 let flux = field.out_of(cell, facet as usize);
-                own.rate += flux;
                 own.outward += flux.max(0.0);
                 own.inward += (-flux).max(0.0);
             }

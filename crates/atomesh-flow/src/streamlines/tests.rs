@@ -312,19 +312,16 @@ fn times_of_cells_conserve_volume_also_in_cycles() {
     }
     let porosity = Porosity::Constant(1.0);
     let times = time_of_flight(&grid, &setting, &solution, porosity, &mut Silent).unwrap();
-    for cell in (0..times.len()).filter(|&cell| !times[cell].is_finite()) {
-        let inner =
-            grid.facets_of(cell).iter().filter(|&&f| grid.facets()[f as usize].neighbour.is_some());
-        assert_eq!(
-            inner.count(),
-            1,
-            "nothing flows through a dead end, something through all others"
-        );
-    }
-    // what flows into the sink has been under way for the pore volume over the rate: Σ q⁻ τ = φ |box|
-    let taken = solution.sources.iter().zip(&times);
-    let sum: f64 = taken.map(|(q, time)| (-q).max(0.0) * time).sum();
-    assert!((sum - 1.0).abs() < 1e-9, "{sum}");
+    // nothing but rounding flows through a corner's cell with two sides on the boundary
+    let inside = |f: &&u32| grid.facets()[**f as usize].neighbour.is_some();
+    let passed = |cell: &usize| grid.facets_of(*cell).iter().filter(inside).count() > 1;
+    let cells: Vec<usize> = (0..times.len()).filter(passed).collect();
+    assert!(cells.iter().all(|&cell| times[cell].is_finite()));
+    // what flows into the sink has been under way for the pore volume over the rate: Σ q⁻ τ = Σ φ |K|
+    let pores: f64 = cells.iter().map(|&cell| grid.measures()[cell]).sum();
+    let taken = cells.iter().map(|&cell| (-solution.sources[cell]).max(0.0) * times[cell]);
+    let sum: f64 = taken.sum();
+    assert!((sum - pores).abs() < 1e-9, "{sum} {pores}");
     let lines = traced(&grid, &problem, &solution, 50);
     assert!(lines.iter().all(|line| line.end == End::Well), "a line from outside enters no eddy");
 }
