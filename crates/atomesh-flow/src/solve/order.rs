@@ -189,7 +189,7 @@ fn depth_first(parents: &[u32]) -> Vec<u32> {
 fn dissect<const D: usize>(graph: &Graph, places: &[Point<D>]) -> Vec<u32> {
     let mut blocks: Vec<u32> = (0..places.len() as u32).collect();
     let mut side = vec![0_u32; places.len()];
-    // parts still to be halved: where they start and end; a separator stays at the end of its part
+    // parts still to be halved; a separator stays at the end of its part
     let mut parts = vec![0..blocks.len()];
     let mut stamp = 0;
     while let Some(part) = parts.pop() {
@@ -199,33 +199,43 @@ fn dissect<const D: usize>(graph: &Graph, places: &[Point<D>]) -> Vec<u32> {
         let own = &mut blocks[part.clone()];
         let middle = halve(own, places);
         stamp += 2;
-        for (at, &block) in own.iter().enumerate() {
-            side[block as usize] = stamp + u32::from(at >= middle);
-        }
-        let touches = |block: &u32, other: u32| {
-            graph.beside(*block).iter().any(|&near| side[near as usize] == other)
-        };
-        let (low, high) = own.split_at(middle);
-        let (from, to): (Vec<u32>, Vec<u32>) = (
-            low.iter().copied().filter(|block| touches(block, stamp + 1)).collect(),
-            high.iter().copied().filter(|block| touches(block, stamp)).collect(),
-        );
-        let separator = if from.len() < to.len() { from } else { to };
-        for &block in &separator {
-            side[block as usize] = 0;
-        }
-        let of_side = |own: &[u32], wanted: u32| -> Vec<u32> {
-            own.iter().copied().filter(|&block| side[block as usize] == wanted).collect()
-        };
-        let (low, high) = (of_side(own, stamp), of_side(own, stamp + 1));
-        let (first, second) = (low.len(), low.len() + high.len());
-        own[..first].copy_from_slice(&low);
-        own[first..second].copy_from_slice(&high);
-        own[second..].copy_from_slice(&separator);
+        let [first, second] = separate(graph, own, middle, (&mut side, stamp));
         parts.push(part.start..part.start + first);
         parts.push(part.start + first..part.start + second);
     }
     blocks
+}
+
+/// Puts the separator of two halves last, the smaller of the two sets of blocks that touch the other half; returns where
+/// the first half and the second end. `side` then has `stamp` for the first half and `stamp + 1` for the second.
+fn separate(
+    graph: &Graph,
+    own: &mut [u32],
+    middle: usize,
+    (side, stamp): (&mut [u32], u32),
+) -> [usize; 2] {
+    for (at, &block) in own.iter().enumerate() {
+        side[block as usize] = stamp + u32::from(at >= middle);
+    }
+    let touching = |half: &[u32], other: u32| -> Vec<u32> {
+        let near = |block: &&u32| graph.beside(**block).iter().any(|&n| side[n as usize] == other);
+        half.iter().filter(near).copied().collect()
+    };
+    let (low, high) = own.split_at(middle);
+    let (from, to) = (touching(low, stamp + 1), touching(high, stamp));
+    let separator = if from.len() < to.len() { from } else { to };
+    for &block in &separator {
+        side[block as usize] = 0;
+    }
+    let of_side = |wanted: u32| -> Vec<u32> {
+        own.iter().copied().filter(|&block| side[block as usize] == wanted).collect()
+    };
+    let (low, high) = (of_side(stamp), of_side(stamp + 1));
+    let (first, second) = (low.len(), low.len() + high.len());
+    own[..first].copy_from_slice(&low);
+    own[first..second].copy_from_slice(&high);
+    own[second..].copy_from_slice(&separator);
+    [first, second]
 }
 
 /// Puts the lower half by the longest extent first; returns where the other begins.
