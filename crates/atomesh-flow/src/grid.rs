@@ -41,7 +41,7 @@ enum Shape<const D: usize> {
     /// Triangles or tetrahedra.
     Simplices(Mesh<D>),
     /// Each cell is what is nearest to its site.
-    Cells(PolyMesh<D>),
+    Cells(Box<PolyMesh<D>>),
 }
 
 /// What flow needs to know of a mesh: cells, facets, and names of facets.
@@ -121,7 +121,7 @@ impl<const D: usize> Grid<D> {
                 sets[first + number as usize - 1].facets.push(face as u32);
             }
         }
-        let shape = Shape::Cells(mesh.clone());
+        let shape = Shape::Cells(Box::new(mesh.clone()));
         Self::new(mesh.measures().to_vec(), mesh.centroids().to_vec(), facets, sets, shape)
     }
 

@@ -190,18 +190,18 @@ fn dissect<const D: usize>(graph: &Graph, places: &[Point<D>]) -> Vec<u32> {
     let mut blocks: Vec<u32> = (0..places.len() as u32).collect();
     let mut side = vec![0_u32; places.len()];
     // parts still to be halved; a separator stays at the end of its part
-    let mut parts = vec![0..blocks.len()];
+    let mut parts = Vec::from([(0, blocks.len())]);
     let mut stamp = 0;
-    while let Some(part) = parts.pop() {
-        if part.len() <= LEAF {
+    while let Some((start, end)) = parts.pop() {
+        if end - start <= LEAF {
             continue;
         }
-        let own = &mut blocks[part.clone()];
+        let own = &mut blocks[start..end];
         let middle = halve(own, places);
         stamp += 2;
         let [first, second] = separate(graph, own, middle, (&mut side, stamp));
-        parts.push(part.start..part.start + first);
-        parts.push(part.start + first..part.start + second);
+        parts.push((start, start + first));
+        parts.push((start + first, start + second));
     }
     blocks
 }
