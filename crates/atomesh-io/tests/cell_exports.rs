@@ -51,7 +51,11 @@ fn features<const D: usize>(mesh: &PolyMesh<D>) -> FeatureFaces {
     FeatureFaces { of_faces, strengths: Vec::new(), areas: vec![2.0, 1.0] }
 }
 
-fn with_data<const D: usize>(frame: &Frame<D>, mesh: &PolyMesh<D>, use_it: impl FnOnce(&CellData<D>)) {
+fn with_data<const D: usize>(
+    frame: &Frame<D>,
+    mesh: &PolyMesh<D>,
+    use_it: impl FnOnce(&CellData<D>),
+) {
     let options = serde_json::json!({ "lattice": { "units": "physical" } });
     let provenance = Provenance { version: "0".into(), options, seed: 7 };
     let features = features(mesh);
@@ -151,13 +155,18 @@ fn files_that_hold_no_such_cells_are_refused() {
     let x = row.split(',').nth(1).unwrap();
     let moved = row.replacen(x, &format!("{:?}", x.parse::<f64>().unwrap() + 0.01), 1);
     let error = fails(&whole.replacen(row, &moved, 1));
-    assert!(matches!(error, CellReadError::OtherCell { .. } | CellReadError::Voronoi(_)), "{error}");
+    assert!(
+        matches!(error, CellReadError::OtherCell { .. } | CellReadError::Voronoi(_)),
+        "{error}"
+    );
     let error = fails(&whole.replacen("site_x", "place_x", 1));
     assert!(error.to_string().contains("site_x"), "{error}");
     let error = fails(&whole.replacen(x, "east", 1));
     assert!(error.to_string().contains("line 2") && error.to_string().contains("east"), "{error}");
     std::fs::write(&list, "{}").unwrap();
-    assert!(read_cells(&list, &mut Silent).unwrap_err().to_string().contains("list of connections"));
+    assert!(
+        read_cells(&list, &mut Silent).unwrap_err().to_string().contains("list of connections")
+    );
 }
 
 /// The rows of a block.
@@ -235,7 +244,10 @@ fn polyhedra_have_the_volumes_and_conductances_of_the_cells() {
     let [disu, npf, _] = written(&frame, &mesh, &rock, "cells.disu");
     let faces = connections(&mesh);
     let nja = count + 2 * faces.len();
-    assert_eq!(block(&disu, "DIMENSIONS"), [["NODES", &count.to_string()], ["NJA", &nja.to_string()]]);
+    assert_eq!(
+        block(&disu, "DIMENSIONS"),
+        [["NODES", &count.to_string()], ["NJA", &nja.to_string()]]
+    );
     let of_cells = |name: &str| array(&disu, name, count);
     for cell in 0..count {
         let height = of_cells("TOP")[cell] - of_cells("BOT")[cell];
@@ -243,7 +255,8 @@ fn polyhedra_have_the_volumes_and_conductances_of_the_cells() {
         assert!((volume / mesh.measures()[cell] - 1.0).abs() < 1e-12);
     }
     let of_pairs = |name: &str| array(&disu, name, nja);
-    let (iac, ja, cl, width) = (of_cells("IAC"), of_pairs("JA"), of_pairs("CL12"), of_pairs("HWVA"));
+    let (iac, ja, cl, width) =
+        (of_cells("IAC"), of_pairs("JA"), of_pairs("CL12"), of_pairs("HWVA"));
     assert!(of_pairs("IHC").iter().all(|flag| *flag == 1.0));
     let permeability = array(&npf, "K", count);
     let mut starts = vec![0];
@@ -274,8 +287,7 @@ fn two_squares_are_written_as_these_lines() {
     let middle = |k: usize, share: f64| bounds.min[k] + share * (bounds.max[k] - bounds.min[k]);
     let sites = [0.25, 0.75].map(|share| [middle(0, share), middle(1, 0.5)]);
     let mesh = voronoi(&Delaunay::<2>::new(), &sites, bounds, &mut Silent).unwrap();
-    let rock =
-        Rock { permeability: &[2.0, 3.0], multipliers: &[0.5], top: 0.0, thickness: 10.0 };
+    let rock = Rock { permeability: &[2.0, 3.0], multipliers: &[0.5], top: 0.0, thickness: 10.0 };
     let [disv, npf, hfb] = written_without_features(&frame, &mesh, &rock);
     assert_eq!(disv, include_str!("data/two-squares.disv"));
     assert_eq!(npf, include_str!("data/two-squares.npf"));

@@ -1,9 +1,12 @@
 //! One equation a cell: what flows out through its faces is what flows in by sources, sides and wells.
 
+use std::collections::BTreeMap;
+
 use atomesh::geometry::Point;
 use atomesh::watch::{Phase, Watch, check};
 
 use super::boundary::{Side, Sides};
+use super::shares::share;
 use super::well::Coupling;
 use crate::error::FlowError;
 use crate::grid::Grid;
@@ -187,12 +190,12 @@ impl<'a, const D: usize> Equations<'a, D> {
     }
 
     /// Through each face out of its cell. What flows through the sides on which a cell's site lies is what balances
-    /// the cell, shared by area.
+    /// the cell.
     fn fluxes(&self, pressures: &[f64], sources: &[f64]) -> Vec<f64> {
         let facets = self.grid.facets();
         let mut fluxes = vec![0.0; facets.len()];
         let mut excess = sources.to_vec();
-        let mut fixed_area = vec![0.0; pressures.len()];
+        let mut fixed: BTreeMap<usize, Vec<u32>> = BTreeMap::new();
         for (face, facet) in facets.iter().enumerate() {
             let cell = facet.cell as usize;
             let flux = match (facet.neighbour, self.inner.get(face)) {
@@ -201,12 +204,12 @@ impl<'a, const D: usize> Equations<'a, D> {
                 }
                 (Some(_), _) => 0.0,
                 (None, _) => match self.sides.faces[face - self.inner.len()] {
-                    Side::Inflow(rate) => -rate,
+                    Side::Inflow(rate) => 0.0 - rate,
                     Side::Pressure { value, transmissibility } => {
                         transmissibility * (pressures[cell] - value)
                     }
                     Side::Fixed => {
-                        fixed_area[cell] += facet.measure();
+                        fixed.entry(cell).or_default().push(face as u32);
                         continue;
                     }
                 },
@@ -217,10 +220,8 @@ impl<'a, const D: usize> Equations<'a, D> {
                 excess[other as usize] += flux;
             }
         }
-        for (at, _) in self.sides.faces.iter().enumerate().filter(|(_, s)| **s == Side::Fixed) {
-            let face = self.inner.len() + at;
-            let cell = facets[face].cell as usize;
-            fluxes[face] = excess[cell] * facets[face].measure() / fixed_area[cell];
+        for (cell, faces) in fixed {
+            share(self.grid, cell, &faces, excess[cell], &mut fluxes);
         }
         fluxes
     }

@@ -15,6 +15,7 @@
 
 mod boundary;
 mod equations;
+mod shares;
 #[cfg(test)]
 mod tests;
 mod transmissibility;
