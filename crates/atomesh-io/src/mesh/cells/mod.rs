@@ -12,7 +12,7 @@ mod table;
 pub use connections::{ConnectionFiles, Flow, write_connections, write_connections_with_flow};
 pub use foam::poly_mesh_of;
 pub use modflow::{ModflowFiles, Rock, write_modflow};
-pub(crate) use read::RawCells;
+pub(in crate::mesh) use read::RawCells;
 pub use read::{AnyCells, CellReadError, LoadedCells, read_cells};
 
 use atomesh::image::Frame;

@@ -113,7 +113,7 @@ pub enum AnyCells {
 
 /// What a file says of cells.
 #[derive(Debug, Default)]
-pub(crate) struct RawCells {
+pub(in crate::mesh) struct RawCells {
     pub dimension: usize,
     /// Padded by 0 in the plane.
     pub sites: Vec<Point<3>>,

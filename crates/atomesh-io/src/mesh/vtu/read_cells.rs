@@ -12,7 +12,7 @@ const POLYGON: u32 = 7;
 const POLYHEDRON: u32 = 42;
 
 /// Reads what a VTU file of Voronoi cells says of them, its corners and faces apart.
-pub(crate) fn read_cells_vtu(bytes: &[u8]) -> Result<RawCells, MeshReadError> {
+pub(in crate::mesh) fn read_cells_vtu(bytes: &[u8]) -> Result<RawCells, MeshReadError> {
     let document = Document::parse(bytes, "UnstructuredGrid")?;
     let [piece] = &document.pieces[..] else {
         return Err(malformed(0, "one piece", document.pieces.len().to_string()));
