@@ -90,8 +90,9 @@ impl<const D: usize> Solution<D> {
     /// What flows in and out, from fluxes and sources alone.
     pub fn balance(&self, grid: &Grid<D>) -> Balance {
         let mut balance = Balance {
-            wells_in: self.wells.iter().map(|well| well.rate.max(0.0)).sum(),
-            wells_out: self.wells.iter().map(|well| (-well.rate).max(0.0)).sum(),
+            // an empty sum is −0
+            wells_in: self.wells.iter().fold(0.0, |sum, well| sum + well.rate.max(0.0)),
+            wells_out: self.wells.iter().fold(0.0, |sum, well| sum + (-well.rate).max(0.0)),
             boundary_in: 0.0,
             boundary_out: 0.0,
             source: 0.0,

@@ -1,17 +1,17 @@
 //! `atomesh export`: Voronoi cells for other flow simulators.
 
 use std::path::{Path, PathBuf};
-use std::str::FromStr;
 
 use atomesh::voronoi::PolyMesh;
 use atomesh_flow::two_point::transmissibilities;
-use atomesh_flow::{Barrier, FlowError, Grid, Permeability, Problem, Setting};
+use atomesh_flow::{FlowError, Grid, Permeability, Problem, Setting};
 use atomesh_io::mesh::MeshWriteError;
 use atomesh_io::mesh::cells::{
     AnyCells, CellData, CellReadError, ConnectionFiles, Flow, LoadedCells, ModflowFiles, Rock,
     read_cells, write_connections_with_flow, write_modflow,
 };
 
+use super::flow::wells::BarrierSpec;
 use crate::failure::Failure;
 use crate::outputs::{Places, check_writable, unknown_ending};
 use crate::progress::{Progress, writing};
@@ -33,8 +33,8 @@ use crate::values::number_in;
 Examples:
   Cells and connections with transmissibilities, feature 1 sealed, feature 2 nearly so:
     atomesh mesh faults.png -o cells.vtu --mesh voronoi --connections cells.json
-    atomesh export cells.json -o flow.json --permeability 2.5 --multiplier feature-1=0 \\
-      --multiplier feature-2=0.01
+    atomesh export cells.json -o flow.json --permeability 2.5 --barrier feature-1=0 \\
+      --barrier feature-2=0.01
   A layer 10 thick for MODFLOW 6, with permeability from a field of the cells:
     atomesh export cells.vtu -o layer.disv --permeability k --thickness 10")]
 pub struct ExportArgs {
@@ -48,8 +48,8 @@ pub struct ExportArgs {
     #[arg(long, value_name = "VALUE|NAME", default_value = "1")]
     permeability: String,
     /// What share of the flow a feature lets through, 0 (sealed) to 1. May be given many times
-    #[arg(long, value_name = "NAME=VALUE")]
-    multiplier: Vec<Multiplier>,
+    #[arg(long, value_name = "NAME=M")]
+    barrier: Vec<BarrierSpec>,
     /// Thickness of the layer of polygons (.disv)
     #[arg(long, value_name = "LENGTH", default_value = "1",
         value_parser = number_in(f64::MIN_POSITIVE, f64::MAX, "a number above 0"))]
@@ -58,27 +58,6 @@ pub struct ExportArgs {
     #[arg(long, value_name = "HEIGHT", default_value = "0", allow_hyphen_values = true,
         value_parser = number_in(f64::MIN, f64::MAX, "a finite number"))]
     top: f64,
-}
-
-/// A feature and its multiplier.
-#[derive(Clone, Debug, PartialEq)]
-struct Multiplier {
-    name: String,
-    value: f64,
-}
-
-impl FromStr for Multiplier {
-    type Err = String;
-
-    fn from_str(text: &str) -> Result<Self, String> {
-        let parts = text.rsplit_once('=');
-        match parts.and_then(|(name, value)| Some((name, value.parse().ok()?))) {
-            Some((name, value)) if (0.0..=1.0).contains(&value) && !name.is_empty() => {
-                Ok(Self { name: name.to_string(), value })
-            }
-            _ => Err("expected NAME=VALUE, VALUE from 0 to 1".into()),
-        }
-    }
 }
 
 /// What is written.
@@ -134,7 +113,7 @@ fn paths(args: &ExportArgs, format: Format) -> Vec<PathBuf> {
     if format == Format::Connections {
         return ConnectionFiles::of(&args.output).paths().map(Path::to_path_buf).to_vec();
     }
-    let files = ModflowFiles::of(&args.output, !args.multiplier.is_empty());
+    let files = ModflowFiles::of(&args.output, !args.barrier.is_empty());
     files.paths().into_iter().map(Path::to_path_buf).collect()
 }
 
@@ -159,8 +138,7 @@ fn export<const D: usize>(
     watch: &mut Progress,
 ) -> Result<String, Failure> {
     let grid = Grid::of_cells(&cells.mesh, Some(&cells.features));
-    let barrier = |own: &Multiplier| Barrier { group: own.name.clone(), multiplier: own.value };
-    let barriers = args.multiplier.iter().map(barrier).collect();
+    let barriers = args.barrier.iter().map(BarrierSpec::barrier).collect();
     let permeability = permeability(args, cells)?;
     let problem = Problem { permeability, barriers, ..Problem::default() };
     let failure = |e: FlowError| flow_failure(e, args);
@@ -180,7 +158,7 @@ fn export<const D: usize>(
     } else {
         let (top, thickness) = (args.top, args.thickness);
         let rock = Rock { permeability: &k, multipliers, top, thickness };
-        let files = ModflowFiles::of(&args.output, !args.multiplier.is_empty());
+        let files = ModflowFiles::of(&args.output, !args.barrier.is_empty());
         write_modflow(&files, &data, &rock, watch)
     };
     written.map_err(|e| match e {

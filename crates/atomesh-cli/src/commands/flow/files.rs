@@ -14,10 +14,10 @@ use atomesh_io::mesh::{
     write_fluxes, write_mesh, write_streamlines,
 };
 
-use super::FlowOutput;
 use super::answer::Answer;
-use super::ground::failure;
+use super::ground::{Body, failure};
 use super::picture::picture;
+use super::{FlowOptions, FlowOutput};
 use crate::dimension::Dimension;
 use crate::failure::Failure;
 use crate::outputs::{Places, check_writable, unknown_ending, write_bytes};
@@ -110,6 +110,27 @@ impl Files {
         Ok(())
     }
 
+    /// Refuses what Voronoi cells, with one pressure each, have no use for.
+    ///
+    /// # Errors
+    /// [`Failure`] names the first option.
+    pub fn check_for_cells(&self, flow: &FlowOptions) -> Result<(), Failure> {
+        if flow.form.is_some() || flow.order.is_some() {
+            let message = "--form and --order are for triangles and tetrahedra, not Voronoi cells";
+            return Err(Failure::misuse(message));
+        }
+        if let Some(path) = &self.pressure {
+            let message = "Voronoi cells have one pressure each; expected -o, which holds it";
+            return Err(Failure::misuse(message).about(path));
+        }
+        match &self.output {
+            Some(path) if path.extension().is_none_or(|e| !e.eq_ignore_ascii_case("vtu")) => {
+                Err(Failure::misuse("Voronoi cells are written as .vtu").about(path))
+            }
+            _ => Ok(()),
+        }
+    }
+
     /// Whether the image is still needed after it was meshed.
     pub fn needs_image(&self) -> bool {
         self.picture.is_some()
@@ -179,8 +200,8 @@ impl Files {
         let about = |e: MeshWriteError| write_failure(e, path);
         let ground = answer.ground;
         let permeability = answer.permeabilities();
-        if let (Some((cells, features)), Some(frame), Some(provenance)) =
-            (&ground.cells, &ground.frame, &ground.provenance)
+        if let (Body::Polytopes(cells, features), Some(frame), Some(provenance)) =
+            (&ground.body, &ground.frame, &ground.provenance)
         {
             let mut fields = CellFields::new(cells.cell_count())
                 .with_numbers("pressure", &answer.solution.pressures)
@@ -197,7 +218,9 @@ impl Files {
             };
             return write().map_err(about);
         }
-        let mut data = mesh_data(answer);
+        let Some(mut data) = mesh_data(answer) else {
+            return Err(Failure::content("Voronoi cells without a frame cannot be written"));
+        };
         data = data
             .with_cell_field("pressure", &answer.solution.pressures)
             .map_err(Failure::content)?;
@@ -210,16 +233,17 @@ impl Files {
 }
 
 /// The mesh with its tags, and where it comes from.
-fn mesh_data<'a, const D: usize>(answer: &Answer<'a, D>) -> MeshData<'a, D> {
+fn mesh_data<'a, const D: usize>(answer: &Answer<'a, D>) -> Option<MeshData<'a, D>> {
     let ground = answer.ground;
-    let mut data = MeshData::new(&ground.mesh).with_tags(&ground.tags);
+    let Body::Simplices(mesh, tags) = &ground.body else { return None };
+    let mut data = MeshData::new(mesh).with_tags(tags);
     if let Some(frame) = &ground.frame {
         data = data.with_frame(frame);
     }
     if let Some(provenance) = &ground.provenance {
         data = data.with_provenance(provenance);
     }
-    data
+    Some(data)
 }
 
 /// Writes the pressure with its jumps.
@@ -229,11 +253,9 @@ fn write_pressure<const D: usize>(
     watch: &mut Progress,
 ) -> Result<(), Failure> {
     let about = |e: MeshWriteError| write_failure(e, path);
-    let Some(galerkin) = &answer.galerkin else {
-        let message = "Voronoi cells have one pressure each; expected -o, which holds it";
-        return Err(Failure::misuse(message).about(path));
+    let (Some(galerkin), Some(data)) = (&answer.galerkin, mesh_data(answer)) else {
+        return Ok(()); // refused before the work
     };
-    let data = mesh_data(answer);
     let data = data.with_cell_vectors("velocity", &answer.velocities).map_err(Failure::content)?;
     let at = |cell: usize, _: usize, place: &Point<D>| galerkin.pressure(cell, place);
     write_broken_vtu(path, &data, galerkin.order(), &at, watch).map_err(about)

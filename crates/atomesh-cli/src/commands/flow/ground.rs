@@ -1,5 +1,7 @@
 //! What flow is computed on: a mesh as read, or that of an image.
 
+use std::path::Path;
+
 use atomesh::features::FeatureFacetOptions;
 use atomesh::geometry::Bounds;
 use atomesh::image::{Frame, Image, Units};
@@ -8,6 +10,7 @@ use atomesh::pipeline::Outcome;
 use atomesh::voronoi::{FeatureFaces, PolyMesh};
 use atomesh_flow::{FlowError, Grid, Problem, Setting, dg, two_point};
 use atomesh_io::image::{AnyImage, ImageFormat};
+use atomesh_io::mesh::cells::{AnyCells, CellReadError, LoadedCells, read_cells};
 use atomesh_io::mesh::{AnyMesh, LoadedMesh, MeshFormat, OwnedField, Provenance};
 
 use super::answer::Answer;
@@ -17,20 +20,25 @@ use super::{FlowOptions, wells};
 use crate::dimension::Dimension;
 use crate::failure::Failure;
 use crate::frame_options::{self, FrameOptions};
+use crate::memory;
 use crate::mesh_file;
 use crate::meshing::{Meshing, labels_alone, shown_path};
 use crate::progress::Progress;
 use crate::run_config::RunConfig;
 use crate::values::Numbers;
 
-/// A mesh in the world with what belongs to it.
+/// The cells, in the world.
+pub enum Body<const D: usize> {
+    /// Triangles or tetrahedra, with their sides and features.
+    Simplices(Mesh<D>, Tags<D>),
+    /// Voronoi cells, with their faces on features.
+    Polytopes(PolyMesh<D>, FeatureFaces),
+}
+
+/// A mesh with what belongs to it.
 pub struct Ground<const D: usize> {
-    /// Triangles or tetrahedra.
-    pub mesh: Mesh<D>,
-    /// Its sides and features.
-    pub tags: Tags<D>,
-    /// The Voronoi cells and their faces on features, if flow is computed on them.
-    pub cells: Option<(PolyMesh<D>, FeatureFaces)>,
+    /// The cells.
+    pub body: Body<D>,
     /// Fields of the mesh's cells.
     pub cell_fields: Vec<OwnedField<f64>>,
     /// The frame of the image.
@@ -61,17 +69,13 @@ pub fn run(
         None => shown_path(&run)?.to_path_buf(),
     };
     let is_image = ImageFormat::of(&path).is_some() || run.frame.shape.is_some();
-    if !is_image && MeshFormat::of(&path).is_ok() {
+    let is_list = path.extension().is_some_and(|e| e.eq_ignore_ascii_case("json"));
+    if !is_image && (is_list || MeshFormat::of(&path).is_ok()) {
         refuse_mesh_options(&run)?;
-        return match mesh_file::read(&path)? {
-            AnyMesh::Flat(mesh) => {
-                let ground = loaded(mesh)?;
-                solve(flow, &run.frame, ground, (&Dimension::flat(), files), watch)
-            }
-            AnyMesh::Volume(mesh) => {
-                let ground = loaded(mesh)?;
-                solve(flow, &run.frame, ground, (&Dimension::volume(), files), watch)
-            }
+        let (flat, volume) = (Dimension::flat(), Dimension::volume());
+        return match read(&path, is_list, watch)? {
+            AnyGround::Flat(ground) => solve(flow, &run.frame, ground, (&flat, files), watch),
+            AnyGround::Volume(ground) => solve(flow, &run.frame, ground, (&volume, files), watch),
         };
     }
     // wells are atoms, so that cells meet or centre there
@@ -112,6 +116,46 @@ fn refuse_mesh_options(run: &RunConfig) -> Result<(), Failure> {
     }
 }
 
+/// A mesh as read, whose dimension the file decides.
+enum AnyGround {
+    Flat(Ground<2>),
+    Volume(Ground<3>),
+}
+
+/// Reads triangles or tetrahedra, or else Voronoi cells.
+fn read(path: &Path, is_list: bool, watch: &mut Progress) -> Result<AnyGround, Failure> {
+    let simplices = match is_list {
+        false => mesh_file::read(path),
+        true => Err(Failure::misuse("no list of connections of Voronoi cells").about(path)),
+    };
+    let failure = match simplices {
+        Ok(AnyMesh::Flat(mesh)) => return Ok(AnyGround::Flat(loaded(mesh)?)),
+        Ok(AnyMesh::Volume(mesh)) => return Ok(AnyGround::Volume(loaded(mesh)?)),
+        Err(failure) => failure,
+    };
+    match read_cells(path, watch) {
+        Ok(AnyCells::Flat(cells)) => Ok(AnyGround::Flat(loaded_cells(cells))),
+        Ok(AnyCells::Volume(cells)) => Ok(AnyGround::Volume(loaded_cells(cells))),
+        Err(CellReadError::Cancelled(_)) => Err(Failure::cancelled()),
+        Err(e) if is_list => Err(Failure::content(e).about(path)),
+        Err(_) => Err(failure),
+    }
+}
+
+/// Voronoi cells as read.
+fn loaded_cells<const D: usize>(loaded: LoadedCells<D>) -> Ground<D> {
+    let LoadedCells { mesh, features, fields, frame, provenance } = loaded;
+    Ground {
+        body: Body::Polytopes(mesh, features),
+        cell_fields: fields,
+        frame: Some(frame),
+        image: None,
+        provenance: Some(provenance),
+        units: Units::Physical,
+        z_up: false,
+    }
+}
+
 /// A mesh as read.
 fn loaded<const D: usize>(loaded: LoadedMesh<D>) -> Result<Ground<D>, Failure> {
     let LoadedMesh { mesh, tags, cell_fields, frame, provenance, .. } = loaded;
@@ -124,9 +168,7 @@ fn loaded<const D: usize>(loaded: LoadedMesh<D>) -> Result<Ground<D>, Failure> {
         _ => tags,
     };
     Ok(Ground {
-        mesh,
-        tags,
-        cells: None,
+        body: Body::Simplices(mesh, tags),
         cell_fields,
         frame,
         image: None,
@@ -146,30 +188,41 @@ fn meshed<const D: usize>(
 ) -> Result<Ground<D>, Failure> {
     let keep = files.needs_image();
     let (prepared, image) = meshing.prepare(image, dimension, keep, watch)?;
+    for (option, spec) in wells::options(&flow.source, &flow.sink) {
+        let place = prepared.frame().world_to_lattice(Units::Samples, &spec.place(option)?);
+        let shape = prepared.frame().shape();
+        if (0..D).any(|k| !(-1e-9..=shape[k] as f64 - 1.0 + 1e-9).contains(&place[k])) {
+            let message = format!("--{option} {spec} lies outside the image");
+            return Err(Failure::misuse(message)
+                .about(meshing.path)
+                .advise("places are in world coordinates; atomesh info IMAGE shows the box"));
+        }
+    }
     let outcome = prepared.run(watch).map_err(|e| meshing.failure(e))?;
     let z_is_height = ImageFormat::of(meshing.path).is_some_and(ImageFormat::z_is_height);
     let z_up = z_is_height && outcome.frame().direction()[D - 1][D - 1] > 0.0;
-    let mesh = outcome.world_mesh();
-    let cells = outcome.world_cells();
-    let features = || outcome.cell_features_from(-flow.below).unwrap_or_default();
-    let tags = if cells.is_some() {
-        Tags::default()
-    } else {
-        tags(&outcome, &mesh, flow, watch).map_err(|f| f.about(meshing.path))?
+    let body = match outcome.world_cells() {
+        Some(cells) => {
+            let features = outcome.cell_features_from(-flow.below).unwrap_or_default();
+            Body::Polytopes(cells, features)
+        }
+        None => {
+            let mesh = outcome.world_mesh();
+            let tags = tags(&outcome, &mesh, flow, watch).map_err(|f| f.about(meshing.path))?;
+            Body::Simplices(mesh, tags)
+        }
     };
     let options = meshing.run.provenance::<D>();
     let seed = options["optimize"]["seed"].as_u64().unwrap_or(0);
     let provenance = Provenance { version: env!("CARGO_PKG_VERSION").into(), options, seed };
     Ok(Ground {
-        tags,
-        cells: cells.map(|cells| (cells, features())),
+        body,
         cell_fields: Vec::new(),
         frame: Some(*outcome.frame()),
         image,
         provenance: Some(provenance),
         units: outcome.units(),
         z_up,
-        mesh,
     })
 }
 
@@ -196,9 +249,9 @@ fn solve<const D: usize>(
     (dimension, files): (&Dimension<D>, &Files),
     watch: &mut Progress,
 ) -> Result<String, Failure> {
-    let grid = match &ground.cells {
-        Some((cells, features)) => Grid::of_cells(cells, Some(features)),
-        None => Grid::of_mesh(&ground.mesh, &ground.tags),
+    let grid = match &ground.body {
+        Body::Polytopes(cells, features) => Grid::of_cells(cells, Some(features)),
+        Body::Simplices(mesh, tags) => Grid::of_mesh(mesh, tags),
     };
     let (wells, open) = wells::wells(&flow.source, &flow.sink)?;
     let names = grid.sets().iter().map(|set| set.name.as_str());
@@ -215,17 +268,14 @@ fn solve<const D: usize>(
         return Err(Failure::misuse(message));
     }
     let setting = Setting::new(&problem, &grid).map_err(failure)?;
-    let (solution, galerkin) = match &ground.cells {
-        Some((cells, _)) => {
-            if flow.form.is_some() || flow.order.is_some() {
-                let message =
-                    "--form and --order are for triangles and tetrahedra, not Voronoi cells";
-                return Err(Failure::misuse(message));
-            }
+    let (solution, galerkin) = match &ground.body {
+        Body::Polytopes(cells, _) => {
+            files.check_for_cells(flow)?;
             let solution = two_point::solve(cells, &grid, &setting, &flow.solve(), watch);
             (solution.map_err(failure)?, None)
         }
-        None => {
+        Body::Simplices(..) => {
+            check_memory(dg::memory(&grid, &flow.galerkin()))?;
             let answer = dg::solve(&grid, &setting, &flow.galerkin(), watch).map_err(failure)?;
             (answer.solution.clone(), Some(answer))
         }
@@ -242,6 +292,16 @@ fn solve<const D: usize>(
     files.write(&answer, dimension, watch)?;
     watch.say(&answer.summary(watch));
     Ok(answer.table())
+}
+
+/// Refuses equations that do not fit.
+fn check_memory(needed: u64) -> Result<(), Failure> {
+    let Some(available) = memory::available().filter(|&available| needed > available) else {
+        return Ok(());
+    };
+    let (needed, available) = (memory::text(needed), memory::text(available));
+    let message = format!("the equations need some {needed} of memory; {available} are left");
+    Err(Failure::content(message).advise("choose a lower --order, or a greater --size"))
 }
 
 /// What the library refuses, in the user's terms.

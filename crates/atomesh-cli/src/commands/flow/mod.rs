@@ -5,7 +5,7 @@ mod files;
 mod ground;
 mod permeability;
 mod picture;
-mod wells;
+pub mod wells;
 
 use std::path::PathBuf;
 
@@ -14,6 +14,7 @@ use atomesh_flow::solve::{Method, SolveOptions};
 
 use crate::failure::Failure;
 use crate::frame_options::FrameOptions;
+use crate::memory;
 use crate::progress::Progress;
 use crate::run_config::{
     ImprovementOptions, InputOptions, LatticeOptions, OptimizerOptions, OutputOptions,
@@ -140,6 +141,7 @@ impl FlowOptions {
         SolveOptions {
             method: self.solver,
             tolerance: self.solver_tolerance,
+            memory: memory::available().unwrap_or(u64::MAX) / 10 * 8,
             ..SolveOptions::default()
         }
     }
@@ -220,5 +222,8 @@ pub fn run(args: FlowArgs, watch: &mut Progress) -> Result<String, Failure> {
         run.output = OutputOptions::default();
     }
     let files = files::Files::new(&output, &run)?;
+    if run.is_voronoi() {
+        files.check_for_cells(&flow)?;
+    }
     ground::run(run, &flow, &files, watch)
 }

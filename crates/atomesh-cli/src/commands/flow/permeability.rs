@@ -8,7 +8,7 @@ use atomesh_flow::Permeability;
 use atomesh_io::image::ImageFormat;
 
 use super::FlowOptions;
-use super::ground::Ground;
+use super::ground::{Body, Ground};
 use crate::dimension::Dimension;
 use crate::failure::Failure;
 use crate::frame_options::{self, FrameOptions};
@@ -28,9 +28,9 @@ pub fn permeability<const D: usize>(
     if let Some(path) = &options.permeability_image {
         let image = read(path, frame, ground, dimension, watch)?;
         let statistic = options.permeability_mean.parse().map_err(Failure::misuse)?;
-        let values = match &ground.cells {
-            Some((cells, _)) => means(cells, &image, statistic, watch),
-            None => means(&ground.mesh, &image, statistic, watch),
+        let values = match &ground.body {
+            Body::Polytopes(cells, _) => means(cells, &image, statistic, watch),
+            Body::Simplices(mesh, _) => means(mesh, &image, statistic, watch),
         };
         return values.map(Permeability::Cells).map_err(|failure| failure.about(path));
     }

@@ -9,6 +9,7 @@ use atomesh_draw::{FlowCells, FlowLine, FlowPicture, FlowStyle, FlowWell, Pictur
 use atomesh_flow::streamlines::Streamline;
 
 use super::answer::Answer;
+use super::ground::{Body, Ground};
 use crate::dimension::Dimension;
 use crate::failure::Failure;
 
@@ -22,81 +23,87 @@ pub fn picture<const D: usize>(
     lines: &[Streamline<D>],
     dimension: &Dimension<D>,
 ) -> Result<Picture, Failure> {
-    let drawn = Drawn::new(answer, lines);
+    let ground = answer.ground;
+    let shape = Shape::new(ground);
+    let turn = |v: &Point<D>| turned(ground, v);
+    let velocities: Vec<Point<D>> = answer.velocities.iter().map(turn).collect();
     let wells: Vec<FlowWell<D>> = (answer.setting.problem().wells.iter())
         .zip(&answer.solution.wells)
-        .map(|(well, flow)| FlowWell { place: drawn.place(&well.place), rate: flow.rate })
+        .map(|(well, flow)| FlowWell { place: place(ground, &well.place), rate: flow.rate })
         .collect();
     let barriers: Vec<u32> = (answer.setting.multipliers().iter().enumerate())
         .filter(|(_, multiplier)| **multiplier < 1.0)
         .map(|(facet, _)| facet as u32)
         .collect();
-    let ways = lines.iter().zip(&drawn.lines);
-    let lines: Vec<FlowLine<'_, D>> =
-        ways.map(|(line, points)| FlowLine { points, times: &line.times }).collect();
-    let pressures = if shows_pressure { &answer.solution.pressures[..] } else { &[] };
+    let placed = |line: &Streamline<D>| line.points.iter().map(|p| place(ground, p)).collect();
+    let ways: Vec<Vec<Point<D>>> = lines.iter().map(placed).collect();
+    let lines: Vec<FlowLine<'_, D>> = (lines.iter().zip(&ways))
+        .map(|(line, points)| FlowLine { points, times: &line.times })
+        .collect();
+    let pressures = if shows_pressure { shown_pressures(answer) } else { Vec::new() };
     let picture = FlowPicture {
-        image: answer.ground.image.as_ref().filter(|_| !shows_pressure),
+        image: ground.image.as_ref().filter(|_| !shows_pressure),
         barriers: &barriers,
-        velocities: &drawn.velocities,
-        pressures,
+        velocities: &velocities,
+        pressures: &pressures,
         wells: &wells,
         lines: &lines,
-        ..FlowPicture::new(drawn.cells())
+        ..FlowPicture::new(shape.cells())
     };
-    let ground = answer.ground;
     let style = Style { units: ground.units, z_up: ground.z_up, ..Style::default() };
     (dimension.draw_flow)(&picture, &style, &FlowStyle::default()).map_err(Failure::content)
 }
 
-/// What is drawn, in sample coordinates.
-struct Drawn<'a, const D: usize> {
-    answer: &'a Answer<'a, D>,
-    mesh: Option<Mesh<D>>,
-    polytopes: Option<PolyMesh<D>>,
-    velocities: Vec<Point<D>>,
-    lines: Vec<Vec<Point<D>>>,
+/// The cells in sample coordinates.
+enum Shape<const D: usize> {
+    Simplices(Mesh<D>),
+    Polytopes(PolyMesh<D>),
 }
 
-impl<'a, const D: usize> Drawn<'a, D> {
-    fn new(answer: &'a Answer<'a, D>, lines: &[Streamline<D>]) -> Self {
-        let mut drawn =
-            Self { answer, mesh: None, polytopes: None, velocities: Vec::new(), lines: Vec::new() };
-        let frame = answer.ground.frame.as_ref();
-        if let Some((cells, _)) = &answer.ground.cells {
-            let mirrored = frame.is_some_and(|frame| frame.is_mirrored());
-            drawn.polytopes = Some(cells.moved(mirrored, |p| drawn.place(p)));
-        } else {
-            let mesh = &answer.ground.mesh;
-            drawn.mesh = Some(match frame {
+impl<const D: usize> Shape<D> {
+    fn new(ground: &Ground<D>) -> Self {
+        let frame = ground.frame.as_ref();
+        match &ground.body {
+            Body::Polytopes(cells, _) => {
+                let mirrored = frame.is_some_and(|frame| frame.is_mirrored());
+                Self::Polytopes(cells.moved(mirrored, |p| place(ground, p)))
+            }
+            Body::Simplices(mesh, _) => Self::Simplices(match frame {
                 Some(frame) => lattice_mesh(mesh, frame, Units::Samples),
                 None => mesh.clone(),
-            });
-        }
-        let origin = drawn.place(&[0.0; D]);
-        let turned = |v: &Point<D>| {
-            let end = drawn.place(v);
-            std::array::from_fn(|axis| end[axis] - origin[axis])
-        };
-        let velocities = answer.velocities.iter().map(turned).collect();
-        let placed = |line: &Streamline<D>| line.points.iter().map(|p| drawn.place(p)).collect();
-        let lines = lines.iter().map(placed).collect();
-        Self { velocities, lines, ..drawn }
-    }
-
-    /// A place of the world among the samples.
-    fn place(&self, p: &Point<D>) -> Point<D> {
-        match &self.answer.ground.frame {
-            Some(frame) => frame.world_to_lattice(Units::Samples, p),
-            None => *p,
+            }),
         }
     }
 
     fn cells(&self) -> FlowCells<'_, D> {
-        match (&self.mesh, &self.polytopes) {
-            (_, Some(cells)) => FlowCells::Polytopes(cells),
-            (Some(mesh), None) => FlowCells::Simplices(mesh),
-            (None, None) => FlowCells::Simplices(&self.answer.ground.mesh),
+        match self {
+            Self::Simplices(mesh) => FlowCells::Simplices(mesh),
+            Self::Polytopes(cells) => FlowCells::Polytopes(cells),
         }
     }
+}
+
+/// A place of the world among the samples.
+fn place<const D: usize>(ground: &Ground<D>, p: &Point<D>) -> Point<D> {
+    match &ground.frame {
+        Some(frame) => frame.world_to_lattice(Units::Samples, p),
+        None => *p,
+    }
+}
+
+/// A vector of the world in samples.
+fn turned<const D: usize>(ground: &Ground<D>, vector: &Point<D>) -> Point<D> {
+    let (origin, end) = (place(ground, &[0.0; D]), place(ground, vector));
+    std::array::from_fn(|axis| end[axis] - origin[axis])
+}
+
+/// The pressures, NaN where nothing flows in a compartment of unknown pressure: those would stretch the colours.
+fn shown_pressures<const D: usize>(answer: &Answer<'_, D>) -> Vec<f64> {
+    let (setting, solution) = (answer.setting, &answer.solution);
+    let still = |number: u32| {
+        let has_well = |well: &atomesh_flow::WellFlow| well.compartment == number as usize + 1;
+        solution.pinned.contains(&(number as usize + 1)) && !solution.wells.iter().any(has_well)
+    };
+    let of_cells = setting.compartment_of().iter().zip(&solution.pressures);
+    of_cells.map(|(&number, &p)| if still(number) { f64::NAN } else { p }).collect()
 }

@@ -1,5 +1,6 @@
 //! Wells, sides and barriers as the command line spells them.
 
+use std::fmt;
 use std::str::FromStr;
 
 use atomesh_flow::{Barrier, Boundary, Condition, Control, Value, Well};
@@ -61,6 +62,21 @@ impl WellSpec {
     pub fn coordinates(&self) -> &[f64] {
         &self.place
     }
+}
+
+impl fmt::Display for WellSpec {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        Numbers(self.place.clone()).fmt(f)
+    }
+}
+
+/// All wells with the options that name them, sources first.
+pub fn options<'w>(
+    sources: &'w [WellSpec],
+    sinks: &'w [WellSpec],
+) -> impl Iterator<Item = (&'static str, &'w WellSpec)> {
+    let of = |option, wells: &'w [WellSpec]| wells.iter().map(move |well| (option, well));
+    of("source", sources).chain(of("sink", sinks))
 }
 
 /// The wells, sources first, and the numbers of those whose rates are to balance the others'.
@@ -152,6 +168,13 @@ impl FromStr for BarrierSpec {
         parsed().ok_or_else(|| {
             format!("{text:?}; expected NAME=M, M from 0 to 1, as in feature-2=0.01")
         })
+    }
+}
+
+impl BarrierSpec {
+    /// The barrier.
+    pub fn barrier(&self) -> Barrier {
+        self.0.clone()
     }
 }
 
