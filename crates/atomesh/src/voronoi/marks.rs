@@ -20,8 +20,12 @@ pub struct FeatureFaces {
     pub areas: Vec<f64>,
 }
 
-/// Finds the faces inside the box on which |b| is `least` or more in the mean, grouped by shared edges (2-D:
-/// points). |b|, since b is negated where atoms are to line up alongside features and faces to fall on them.
+/// A face lies along a feature if |b| falls to this share of its mean on the way to the two sites beside it.
+const FALL: f64 = 0.9;
+
+/// Finds the faces inside the box on which |b| is `least` or more in the mean, and which lie along a feature, not
+/// across it: on the face moved to either of its sites |b| is less in the mean; and those of as much |b| that
+/// close a gap between such. Grouped by shared edges (2-D: points). |b|, since b is negated where atoms are to line up alongside features and faces to fall on them.
 /// Groups smaller than `least_area` are left out. The mesh is in lattice coordinates. The mean is taken at points
 /// at most a sample apart.
 pub fn feature_faces<const D: usize>(
@@ -32,17 +36,18 @@ pub fn feature_faces<const D: usize>(
 ) -> FeatureFaces {
     let step = potential.grid().least_step();
     let faces = (0..mesh.inner_face_count()).into_par_iter().with_min_len(BLOCK);
-    let strengths: Vec<f32> = faces.map(|face| strength(mesh, potential, face, step)).collect();
-    let chosen: Vec<usize> =
-        (0..strengths.len()).filter(|&face| f64::from(strengths[face]) >= least).collect();
+    let (strengths, mut along): (Vec<f32>, Vec<bool>) = faces
+        .map(|face| {
+            let strength = strength(mesh, potential, face, [0.0; D], step);
+            (strength as f32, strength >= least && is_along(mesh, potential, face, strength, step))
+        })
+        .unzip();
+    let is_strong = |face: usize| f64::from(strengths[face]) >= least;
+    close_gaps(mesh, &mut along, is_strong);
+    let chosen: Vec<usize> = (0..along.len()).filter(|&face| along[face]).collect();
     let mut ridges: Vec<(u32, u32, u32)> = Vec::new();
     for (index, &face) in chosen.iter().enumerate() {
-        let corners = mesh.face(face);
-        for at in 0..corners.len() {
-            let a = corners[at];
-            let b = if D == 2 { a } else { corners[(at + 1) % corners.len()] };
-            ridges.push((a.min(b), a.max(b), index as u32));
-        }
+        ridges.extend(ridges_of(mesh, face).map(|(a, b)| (a, b, index as u32)));
     }
     ridges.sort_unstable();
     let mut sets = Sets::new(chosen.len());
@@ -68,21 +73,72 @@ pub fn feature_faces<const D: usize>(
     FeatureFaces { of_faces, strengths, areas }
 }
 
-/// The mean of |b| over a face.
+/// The edges of a face by their ends, the lesser first (2-D: its two points, each twice).
+fn ridges_of<const D: usize>(
+    mesh: &PolyMesh<D>,
+    face: usize,
+) -> impl ExactSizeIterator<Item = (u32, u32)> + '_ {
+    let corners = mesh.face(face);
+    (0..corners.len()).map(move |at| {
+        let a = corners[at];
+        let b = if D == 2 { a } else { corners[(at + 1) % corners.len()] };
+        (a.min(b), a.max(b))
+    })
+}
+
+/// Chooses strong faces too half of whose edges, two at least (2-D: both ends), are those of chosen ones. A face across
+/// a feature has but one there.
+fn close_gaps<const D: usize>(
+    mesh: &PolyMesh<D>,
+    chosen: &mut [bool],
+    is_strong: impl Fn(usize) -> bool,
+) {
+    let faces = |wanted: bool, chosen: &[bool]| -> Vec<usize> {
+        (0..chosen.len()).filter(|&face| chosen[face] == wanted).collect()
+    };
+    let mut ridges: Vec<(u32, u32)> =
+        faces(true, chosen).iter().flat_map(|&face| ridges_of(mesh, face)).collect();
+    ridges.sort_unstable();
+    for face in faces(false, chosen).into_iter().filter(|&face| is_strong(face)) {
+        let edges = ridges_of(mesh, face);
+        let (count, held) =
+            (edges.len(), edges.filter(|e| ridges.binary_search(e).is_ok()).count());
+        chosen[face] = held >= count.div_ceil(2).max(2);
+    }
+}
+
+/// Whether |b| falls from the face to both sides.
+fn is_along<const D: usize>(
+    mesh: &PolyMesh<D>,
+    potential: &ImagePotential<D>,
+    face: usize,
+    strength: f64,
+    step: f64,
+) -> bool {
+    let [owner, neighbour] =
+        [mesh.owners()[face], mesh.neighbours()[face]].map(|cell| mesh.sites()[cell as usize]);
+    let half = difference(&neighbour, &owner).map(|x| 0.5 * x);
+    let moved = |way: Point<D>| self::strength(mesh, potential, face, way, step);
+    0.5 * (moved(half) + moved(half.map(|x| -x))) <= FALL * strength
+}
+
+/// The mean of |b| over a face that is moved by a vector; values outside the image are those at its border.
 fn strength<const D: usize>(
     mesh: &PolyMesh<D>,
     potential: &ImagePotential<D>,
     face: usize,
+    way: Point<D>,
     step: f64,
-) -> f32 {
+) -> f64 {
     let (mut sum, mut total) = (0.0, 0.0);
-    for simplex in mesh.simplices(face) {
+    for mut simplex in mesh.simplices(face) {
+        simplex.iter_mut().flatten().zip(way.iter().cycle()).for_each(|(x, w)| *x += w);
         let part = super::poly_mesh::area_vector(&simplex);
         let area = dot(&part, &part).sqrt();
         sum += area * mean(potential, &simplex, step);
         total += area;
     }
-    if total > 0.0 { (sum / total) as f32 } else { 0.0 }
+    if total > 0.0 { sum / total } else { 0.0 }
 }
 
 /// The mean of |b| over a segment or triangle, at the middles of equal parts.
