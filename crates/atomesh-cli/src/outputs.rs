@@ -124,14 +124,7 @@ impl Outputs {
         {
             return Err(unknown_ending(&files.head, ".json"));
         }
-        let picture = match &options.picture {
-            Some(path) => {
-                let format = PictureFormat::of(path);
-                let format = format.map_err(|_| unknown_ending(path, ".png, .svg"))?;
-                Some((path.clone(), format))
-            }
-            None => None,
-        };
+        let picture = picture_file(options.picture.as_deref())?;
         let potential = options.write_potential.clone();
         if let Some(path) = &potential {
             check_potential(path)?;
@@ -217,16 +210,7 @@ impl Outputs {
     /// # Errors
     /// [`Failure`] names the first that does not.
     pub fn check(&self, input: &InputOptions, config: Option<&Path>) -> Result<(), Failure> {
-        let inputs = [
-            &input.image,
-            &input.potential,
-            &input.size_field,
-            &input.beta_field,
-            &input.mask,
-            &input.labels,
-        ];
-        let inputs = inputs.into_iter().flatten().map(PathBuf::as_path);
-        let mut places = Places::taken(inputs);
+        let mut places = Places::taken(input.paths());
         for path in self.paths().chain(config) {
             if path == self.mesh {
                 self.mesh_format.check_writable(path).map_err(|e| cannot_write(path, &e))?;
@@ -399,6 +383,16 @@ fn msh_version(text: &str) -> Result<MshVersion, Failure> {
         "2.2" => Ok(MshVersion::V22),
         _ => Err(Failure::misuse(format!("msh version {text:?}; expected 4.1 or 2.2"))),
     }
+}
+
+/// Where a picture goes and in which format.
+///
+/// # Errors
+/// [`Failure`] if the ending is unknown.
+pub fn picture_file(path: Option<&Path>) -> Result<Option<(PathBuf, PictureFormat)>, Failure> {
+    let Some(path) = path else { return Ok(None) };
+    let format = PictureFormat::of(path).map_err(|_| unknown_ending(path, ".png, .svg"))?;
+    Ok(Some((path.into(), format)))
 }
 
 /// Whether a report is to be a page.

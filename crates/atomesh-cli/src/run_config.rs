@@ -1,6 +1,6 @@
 //! Everything that decides a run of `atomesh mesh`, from the command line or a configuration.
 
-use std::path::PathBuf;
+use std::path::{Path, PathBuf};
 
 use atomesh::distance::GradeBy;
 use atomesh::enhance::{
@@ -368,6 +368,21 @@ section! {
         /// or .raw, float32. .nii, .nrrd and .vti keep the frame
         #[arg(long, value_name = "FILE")]
         pub write_potential: PathBuf,
+    }
+}
+
+impl InputOptions {
+    /// All files that are read.
+    pub fn paths(&self) -> impl Iterator<Item = &Path> {
+        let all = [
+            &self.image,
+            &self.potential,
+            &self.size_field,
+            &self.beta_field,
+            &self.mask,
+            &self.labels,
+        ];
+        all.into_iter().flatten().map(PathBuf::as_path)
     }
 }
 

@@ -58,7 +58,10 @@ fn the_method_names_public_items() {
         let (path, item) = name.rsplit_once("::").expect("a path");
         let source = match path.strip_prefix("atomesh_draw") {
             Some(rest) => root().join("crates/atomesh-draw/src").join(rest.trim_matches(':')),
-            None => root().join("crates/atomesh/src").join(path),
+            None => match path.strip_prefix("atomesh_flow") {
+                Some(rest) => root().join("crates/atomesh-flow/src").join(rest.trim_matches(':')),
+                None => root().join("crates/atomesh/src").join(path),
+            },
         };
         let code =
             if source.is_dir() { sources(&source) } else { read(source.with_extension("rs")) };
@@ -104,7 +107,7 @@ fn ci_runs_the_commands_of_the_readme() {
 #[test]
 fn comments_cite_what_the_references_list() {
     let references = read("REFERENCES.md");
-    for crate_name in ["atomesh", "atomesh-io", "atomesh-draw", "atomesh-cli"] {
+    for crate_name in ["atomesh", "atomesh-flow", "atomesh-io", "atomesh-draw", "atomesh-cli"] {
         let code = sources(&root().join("crates").join(crate_name).join("src"));
         for key in citations(&code) {
             assert!(references.contains(&format!("**{key}**")), "{crate_name} cites {key}");

@@ -12,6 +12,31 @@
 //! heavy dependency, the sparse direct solver. All lengths are those of the mesh's coordinates; permeability
 //! is in any unit, and rates are then in those of permeability × pressure × length^(D−2).
 
+//!
+//! ```
+//! use atomesh::geometry::Bounds;
+//! use atomesh::mesh::{Delaunay, Tags};
+//! use atomesh::watch::Silent;
+//! use atomesh_flow::{Boundary, Condition, Grid, Problem, Setting, Value, dg};
+//!
+//! let points: Vec<[f64; 2]> = (0..25).map(|i| [f64::from(i % 5), f64::from(i / 5)]).collect();
+//! let mesh = Delaunay::<2>::new().connect(&points, &mut Silent)?;
+//! let sides = Tags::sides(&mesh, &Bounds { min: [0.0; 2], max: [4.0; 2] }, 1e-9);
+//! let grid = Grid::of_mesh(&mesh, &sides);
+//! let fixed = |group: &str, pressure| Boundary {
+//!     group: group.into(),
+//!     condition: Condition::Pressure(Value::Constant(pressure)),
+//! };
+//! let boundaries = vec![fixed("xmin", 1.0), fixed("xmax", 0.0)];
+//! let problem = Problem { boundaries, ..Default::default() };
+//! let setting = Setting::new(&problem, &grid)?;
+//! let answer = dg::solve(&grid, &setting, &Default::default(), &mut Silent)?;
+//! let balance = answer.solution.balance(&grid);
+//! // a pressure drop of 1 over a length of 4 drives 1/4 through each unit of the side, which is 4 long
+//! assert!((balance.boundary_in - 1.0).abs() < 1e-12 && balance.relative_error() < 1e-12);
+//! # Ok::<(), Box<dyn std::error::Error>>(())
+//! ```
+
 pub mod dg;
 mod error;
 mod grid;

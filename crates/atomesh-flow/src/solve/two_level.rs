@@ -1,8 +1,8 @@
 //! A preconditioner for blocks of unknowns: sweeps over the blocks, and a correction in a coarse space if there is one.
 //!
 //! Forward sweep, correction by `P (PᵀAP)⁻¹ Pᵀ`, backward sweep: symmetric where A is. The sweeps treat what is
-//! rough, such as jumps between cells, the coarse space what is smooth (Dobrev, Lazarov, Vassilevski &
-//! Zikatanov 2006). The coarse matrix is solved by factors if that is cheap, else by a cycle of multigrid.
+//! rough, such as jumps between cells, the coarse space what is smooth (Dobrev et al.
+//! 2006). The coarse matrix is solved by factors if that is cheap, else by a cycle of multigrid.
 
 use std::borrow::Cow;
 

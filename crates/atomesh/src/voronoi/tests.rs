@@ -1,5 +1,7 @@
 use super::*;
 use crate::geometry::{difference, distance_squared, dot};
+use crate::image::Grid;
+use crate::potential::ImagePotential;
 use crate::watch::Silent;
 use proptest::prelude::*;
 use rand::{RngExt, SeedableRng};
@@ -334,4 +336,41 @@ fn validate_names_what_is_broken() {
     assert!(bent.validate(&cube(4.0)).is_err());
     let turned = mesh.moved(true, |p| *p).validate(&cube(4.0)).unwrap_err();
     assert!(matches!(turned, PolyFault::Measure { cell: 0, .. }), "{turned}");
+}
+
+/// A feature of standard deviation `width`, 1 on the plane y = `height` of a cube of `side` samples.
+fn sheet<const D: usize>(side: usize, height: f64, width: f64) -> ImagePotential<D> {
+    let grid = Grid { shape: [side + 1; D], step: [1.0; D] };
+    let value = |n: usize| {
+        let p: Point<D> =
+            std::array::from_fn(|k| (n / (side + 1).pow(k as u32) % (side + 1)) as f64);
+        let s = (p[1] - height) / width;
+        (-0.5 * s * s).exp() as f32
+    };
+    let samples = (0..(side + 1).pow(D as u32)).map(value).collect();
+    ImagePotential::new(grid, samples, Default::default()).unwrap()
+}
+
+fn faces_lie_along_features<const D: usize>()
+where
+    Axes: Dimension<D>,
+{
+    // sites 10 apart, faces half way: those at y = 25 lie on the feature, those beside it reach into it
+    let bounds = cube::<D>(40.0);
+    let mesh = cells(&crystal(&[[0.0; D]], 10.0, &bounds), bounds);
+    let features = feature_faces(&mesh, &sheet::<D>(40, 25.0, 3.0), 0.2, 0.0);
+    let on: Vec<usize> = (0..mesh.face_count()).filter(|&f| features.of_faces[f] > 0).collect();
+    let is_there = |&face: &usize| (mesh.face_centroid(face)[1] - 25.0).abs() < 1e-9;
+    assert!(on.iter().all(is_there), "none stands across");
+    assert_eq!(on.len(), 5_usize.pow(D as u32 - 1), "all that are there");
+    assert!((features.areas[0] - 40.0_f64.powi(D as i32 - 1)).abs() < 1e-9, "one feature");
+    let across = (0..mesh.inner_face_count()).filter(|face| !on.contains(face));
+    let most = across.map(|face| features.strengths[face]).fold(0.0, f32::max);
+    assert!(most > 0.2, "faces across are as strong as the threshold: {most}");
+}
+
+#[test]
+fn faces_of_features_lie_along_them() {
+    faces_lie_along_features::<2>();
+    faces_lie_along_features::<3>();
 }

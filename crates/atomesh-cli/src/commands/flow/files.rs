@@ -5,7 +5,7 @@ use std::path::{Path, PathBuf};
 use atomesh::geometry::Point;
 use atomesh::watch::Phase;
 use atomesh_draw::PictureFormat;
-use atomesh_flow::streamlines::{Porosity, Streamline, TraceOptions, trace};
+use atomesh_flow::streamlines::{Porosity, Streamline, TraceOptions, time_of_flight, trace};
 use atomesh_io::atomic_file::AtomicFile;
 use atomesh_io::mesh::cells::CellData;
 use atomesh_io::mesh::vtu::{write_broken_vtu, write_cells_vtu_with};
@@ -20,7 +20,7 @@ use super::picture::picture;
 use super::{FlowOptions, FlowOutput};
 use crate::dimension::Dimension;
 use crate::failure::Failure;
-use crate::outputs::{Places, check_writable, unknown_ending, write_bytes};
+use crate::outputs::{Places, check_writable, picture_file, unknown_ending, write_bytes};
 use crate::progress::{Progress, writing};
 use crate::run_config::RunConfig;
 
@@ -59,14 +59,7 @@ impl Files {
         if let Some(path) = &options.output {
             MeshFormat::of(path).map_err(|_| unknown_ending(path, MeshFormat::EXTENSIONS))?;
         }
-        let picture = match &options.picture {
-            Some(path) => {
-                let format = PictureFormat::of(path);
-                let format = format.map_err(|_| unknown_ending(path, ".png, .svg"))?;
-                Some((path.clone(), format))
-            }
-            None => None,
-        };
+        let picture = picture_file(options.picture.as_deref())?;
         let files = Self {
             output: options.output.clone(),
             pressure: options.pressure_output.clone(),
@@ -84,16 +77,7 @@ impl Files {
 
     fn check(&self, run: &RunConfig) -> Result<(), Failure> {
         let _guard = writing();
-        let input = &run.input;
-        let inputs = [
-            &input.image,
-            &input.potential,
-            &input.size_field,
-            &input.beta_field,
-            &input.mask,
-            &input.labels,
-        ];
-        let mut places = Places::taken(inputs.into_iter().flatten().map(PathBuf::as_path));
+        let mut places = Places::taken(run.input.paths());
         let picture = self.picture.as_ref().map(|(path, _)| path);
         let paths = [
             self.output.as_ref(),
@@ -200,11 +184,16 @@ impl Files {
         let about = |e: MeshWriteError| write_failure(e, path);
         let ground = answer.ground;
         let permeability = answer.permeabilities();
+        let porosity = Porosity::Constant(answer.porosity);
+        let times = time_of_flight(answer.grid, answer.setting, &answer.solution, porosity, watch);
+        let never = |t: f64| if t.is_finite() { t } else { f64::NAN };
+        let times: Vec<f64> = times.map_err(failure)?.into_iter().map(never).collect();
         if let (Body::Polytopes(cells, features), Some(frame), Some(provenance)) =
             (&ground.body, &ground.frame, &ground.provenance)
         {
             let mut fields = CellFields::new(cells.cell_count())
                 .with_numbers("pressure", &answer.solution.pressures)
+                .and_then(|fields| fields.with_numbers("time_of_flight", &times))
                 .and_then(|fields| fields.with_vectors("velocity", &answer.velocities))
                 .map_err(Failure::content)?;
             if let Some(values) = &permeability {
@@ -228,6 +217,7 @@ impl Files {
         if let Some(values) = &permeability {
             data = data.with_cell_field("permeability", values).map_err(Failure::content)?;
         }
+        data = data.with_cell_field("time_of_flight", &times).map_err(Failure::content)?;
         write_mesh(path, &data, watch).map_err(about)
     }
 }

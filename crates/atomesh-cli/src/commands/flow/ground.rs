@@ -289,6 +289,9 @@ fn solve<const D: usize>(
         galerkin,
         porosity: flow.porosity,
     };
+    if answer.solution.balance(&grid).scale == 0.0 {
+        watch.say("warning: nothing flows: barriers part all that drives it, or it is the same everywhere");
+    }
     files.write(&answer, dimension, watch)?;
     watch.say(&answer.summary(watch));
     Ok(answer.table())

@@ -157,8 +157,8 @@ impl FlowOptions {
 /// The files that are written.
 #[derive(Clone, Debug, clap::Args)]
 struct FlowOutput {
-    /// Mesh with pressure, velocity and permeability of each cell: .vtu; triangles and tetrahedra also .msh
-    /// .msh2 .vtk .npz
+    /// Mesh with pressure, velocity, mean time of flight from where it flows in (NaN where nothing comes) and
+    /// permeability of each cell: .vtu; triangles and tetrahedra also .msh .msh2 .vtk .npz, without velocity
     #[arg(short, long, value_name = "MESH")]
     output: Option<PathBuf>,
     /// Pressure as the scheme has it, with its jumps: a .vtu whose points are repeated for each cell
