@@ -89,7 +89,7 @@ impl std::str::FromStr for Form {
     }
 }
 
-/// Options of [`solve`].
+/// Options of [`solve()`].
 #[derive(Clone, Copy, Debug, PartialEq, serde::Serialize, serde::Deserialize)]
 pub struct DgOptions {
     /// The form. Default symmetric interior penalty: stable from order 1, and symmetric.
@@ -125,7 +125,7 @@ impl DgOptions {
     }
 }
 
-/// About how much memory [`solve`] takes for a grid, in bytes, where it iterates: 34 for each entry of the matrix, that
+/// About how much memory [`solve()`] takes for a grid, in bytes, where it iterates: 34 for each entry of the matrix, that
 /// is for each pair of functions in a cell and the cells beside it, and 260 for each unknown. Measured; factors, where
 /// they are taken, keep to [`SolveOptions::memory`].
 pub fn memory<const D: usize>(grid: &Grid<D>, options: &DgOptions) -> u64 {

@@ -3,7 +3,7 @@
 //! - [`Outline`]: the smooth outline of a mask. Atoms are drawn to it, grown on it, and put onto it.
 //! - [`trim`]: drops the cells outside of the outline, so that what is left has a manifold boundary on it.
 //! - [`smooth`]: moves points at and near the outline to better places on it, and fits facets to it.
-//! - [`majority`]: the label of each cell, from a label image; [`interfaces`] and [`islands`] between them.
+//! - [`interfaces`] between cells of different labels, and [`islands`] of few cells among others.
 //! - [`components`]: the parts into which facets cut a mesh.
 //!
 //! A mask stands above the lattice, which grows on it; labels need but a mesh.

@@ -32,7 +32,7 @@ pub enum Body<const D: usize> {
     /// Triangles or tetrahedra, with their sides and features.
     Simplices(Mesh<D>, Tags<D>),
     /// Voronoi cells, with their faces on features.
-    Polytopes(PolyMesh<D>, FeatureFaces),
+    Polytopes(Box<PolyMesh<D>>, FeatureFaces),
 }
 
 /// A mesh with what belongs to it.
@@ -146,7 +146,7 @@ fn read(path: &Path, is_list: bool, watch: &mut Progress) -> Result<AnyGround, F
 fn loaded_cells<const D: usize>(loaded: LoadedCells<D>) -> Ground<D> {
     let LoadedCells { mesh, features, fields, frame, provenance } = loaded;
     Ground {
-        body: Body::Polytopes(mesh, features),
+        body: Body::Polytopes(Box::new(mesh), features),
         cell_fields: fields,
         frame: Some(frame),
         image: None,
@@ -204,7 +204,7 @@ fn meshed<const D: usize>(
     let body = match outcome.world_cells() {
         Some(cells) => {
             let features = outcome.cell_features_from(-flow.below).unwrap_or_default();
-            Body::Polytopes(cells, features)
+            Body::Polytopes(Box::new(cells), features)
         }
         None => {
             let mesh = outcome.world_mesh();

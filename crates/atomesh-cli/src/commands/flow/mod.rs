@@ -104,7 +104,7 @@ struct FlowOptions {
     /// The same for one group of facets. May be given again
     #[arg(long, value_name = "NAME=M")]
     barrier: Vec<BarrierSpec>,
-    /// Permeability: a number; K1,K2[,K3] along the axes; a tensor Kxx,Kxy,Kyy or Kxx,Kxy,Kxz,Kyy,Kyz,Kzz; or the
+    /// Permeability: a number; one for each axis, KX,KY or KX,KY,KZ; a tensor Kxx,Kxy,Kyy or Kxx,Kxy,Kxz,Kyy,Kyz,Kzz; or the
     /// name of a cell field of the mesh
     #[arg(long, value_name = "K | NAME", default_value = "1")]
     permeability: String,

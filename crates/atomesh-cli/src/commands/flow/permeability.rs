@@ -29,7 +29,7 @@ pub fn permeability<const D: usize>(
         let image = read(path, frame, ground, dimension, watch)?;
         let statistic = options.permeability_mean.parse().map_err(Failure::misuse)?;
         let values = match &ground.body {
-            Body::Polytopes(cells, _) => means(cells, &image, statistic, watch),
+            Body::Polytopes(cells, _) => means(&**cells, &image, statistic, watch),
             Body::Simplices(mesh, _) => means(mesh, &image, statistic, watch),
         };
         return values.map(Permeability::Cells).map_err(|failure| failure.about(path));

@@ -57,7 +57,7 @@ pub fn picture<const D: usize>(
 /// The cells in sample coordinates.
 enum Shape<const D: usize> {
     Simplices(Mesh<D>),
-    Polytopes(PolyMesh<D>),
+    Polytopes(Box<PolyMesh<D>>),
 }
 
 impl<const D: usize> Shape<D> {
@@ -66,7 +66,7 @@ impl<const D: usize> Shape<D> {
         match &ground.body {
             Body::Polytopes(cells, _) => {
                 let mirrored = frame.is_some_and(|frame| frame.is_mirrored());
-                Self::Polytopes(cells.moved(mirrored, |p| place(ground, p)))
+                Self::Polytopes(Box::new(cells.moved(mirrored, |p| place(ground, p))))
             }
             Body::Simplices(mesh, _) => Self::Simplices(match frame {
                 Some(frame) => lattice_mesh(mesh, frame, Units::Samples),
