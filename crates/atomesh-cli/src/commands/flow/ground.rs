@@ -8,7 +8,8 @@ use atomesh::image::{Frame, Image, Units};
 use atomesh::mesh::{Mesh, Tags};
 use atomesh::pipeline::Outcome;
 use atomesh::voronoi::{FeatureFaces, PolyMesh};
-use atomesh_flow::{FlowError, Grid, Problem, Setting, dg, two_point};
+use atomesh_flow::dg::{self, Form};
+use atomesh_flow::{FlowError, Grid, Problem, Setting, two_point};
 use atomesh_io::image::{AnyImage, ImageFormat};
 use atomesh_io::mesh::cells::{AnyCells, CellReadError, LoadedCells, read_cells};
 use atomesh_io::mesh::{AnyMesh, LoadedMesh, MeshFormat, OwnedField, Provenance};
@@ -275,8 +276,12 @@ fn solve<const D: usize>(
             (solution.map_err(failure)?, None)
         }
         Body::Simplices(..) => {
-            check_memory(dg::memory(&grid, &flow.galerkin()))?;
-            let answer = dg::solve(&grid, &setting, &flow.galerkin(), watch).map_err(failure)?;
+            let options = flow.galerkin();
+            check_memory(dg::memory(&grid, &options))?;
+            if D == 3 && options.form == Form::OdenBabuskaBaumann && grid.cell_count() > OBB_CELLS {
+                watch.say("warning: obb takes long on so many tetrahedra; sipg is much faster");
+            }
+            let answer = dg::solve(&grid, &setting, &options, watch).map_err(failure)?;
             (answer.solution.clone(), Some(answer))
         }
     };
@@ -296,6 +301,9 @@ fn solve<const D: usize>(
     watch.say(&answer.summary(watch));
     Ok(answer.table())
 }
+
+/// Tetrahedra from which on Oden, Babuška & Baumann's equations, which iteration does not solve, take minutes.
+const OBB_CELLS: usize = 3000;
 
 /// Refuses equations that do not fit.
 fn check_memory(needed: u64) -> Result<(), Failure> {
