@@ -2,7 +2,10 @@
 
 use std::path::Path;
 
-use atomesh::mesh::Mesh;
+use atomesh::geometry::Bounds;
+use atomesh::image::{Frame, Units};
+use atomesh::mesh::{Mesh, Tags};
+use atomesh::pipeline::{lattice_mesh, sides};
 use atomesh_io::mesh::{AnyMesh, MeshReadError, read_mesh};
 
 use crate::failure::Failure;
@@ -25,6 +28,16 @@ pub fn read(path: &Path) -> Result<AnyMesh, Failure> {
         MeshReadError::Io(e) => Failure::content(format!("cannot be read: {e}")).about(path),
         _ => Failure::content(e).about(path),
     })
+}
+
+/// The sides of the image's box, or of the mesh's own where the image is not known.
+pub fn own_sides<const D: usize>(mesh: &Mesh<D>, frame: Option<&Frame<D>>) -> Tags<D> {
+    if let Some(frame) = frame {
+        let lattice = lattice_mesh(mesh, frame, Units::Physical);
+        return sides(&lattice, &frame.grid(Units::Physical).bounds(), frame.is_mirrored());
+    }
+    let bounds = Bounds::of(mesh.points());
+    bounds.map_or_else(Tags::default, |bounds| sides(mesh, &bounds, false))
 }
 
 /// The mesh with cells of positive orientation: those that another program wrote the other way are turned.

@@ -460,6 +460,16 @@ impl RunConfig {
         })
     }
 
+    /// Takes from a configuration's file what was not given.
+    ///
+    /// # Errors
+    /// [`Failure`] names the file, if it cannot be read or parsed.
+    pub fn or_file(self, path: &Path) -> Result<Self, Failure> {
+        let text = std::fs::read_to_string(path)
+            .map_err(|e| Failure::content(format!("cannot be read: {e}")).about(path))?;
+        Ok(self.or(Self::parse(&text).map_err(|f| f.about(path))?))
+    }
+
     /// The text of a configuration that gives the same run.
     pub fn to_toml(&self) -> Result<String, Failure> {
         toml::to_string(self).map_err(Failure::content)

@@ -1,5 +1,6 @@
 //! Cells and the facets between them: what both schemes know of a mesh.
 
+use atomesh::features::FeatureSet;
 use atomesh::geometry::{Point, difference, dot};
 use atomesh::mesh::{Mesh, Tags};
 use atomesh::voronoi::{FeatureFaces, PolyMesh, side_name};
@@ -114,8 +115,7 @@ impl<const D: usize> Grid<D> {
             .collect();
         if let Some(features) = features {
             let first = sets.len();
-            let name = |number: usize| format!("feature-{}", number + 1);
-            let names = (0..features.areas.len()).map(name);
+            let names = (0..features.areas.len()).map(FeatureSet::<D>::name);
             sets.extend(names.map(|name| FacetSet { name, facets: Vec::new() }));
             for (face, &number) in features.of_faces.iter().enumerate().filter(|(_, n)| **n > 0) {
                 sets[first + number as usize - 1].facets.push(face as u32);

@@ -5,11 +5,11 @@ use std::path::{Path, PathBuf};
 use atomesh::enhance::{EnhanceError, enhance, given_potential};
 use atomesh::features::{
     FacetField, FacetTest, FeatureFacetOptions, FeatureSet, FeaturesError, find_features,
+    is_feature_name,
 };
-use atomesh::geometry::Bounds;
-use atomesh::image::{Frame, Image, Units};
-use atomesh::mesh::{FacetGroup, Mesh, Tags};
-use atomesh::pipeline::{MeshOptions, lattice_mesh, sides};
+use atomesh::image::{Image, Units};
+use atomesh::mesh::Tags;
+use atomesh::pipeline::{MeshOptions, lattice_mesh};
 use atomesh::potential::ImagePotential;
 use atomesh_io::image::AnyImage;
 use atomesh_io::mesh::{AnyMesh, LoadedMesh, MeshData, MeshFormat, MeshWriteError, write_mesh};
@@ -291,12 +291,9 @@ fn tags<const D: usize>(
     found: &FeatureSet<D>,
 ) -> Result<Tags<D>, Failure> {
     let mesh = &loaded.mesh;
-    let is_feature = |group: &&FacetGroup<D>| {
-        let number = group.name.strip_prefix("feature-");
-        number.is_some_and(|number| number.parse::<u32>().is_ok())
-    };
     let groups = loaded.tags.facet_groups();
-    let kept: Vec<_> = groups.iter().filter(|group| !is_feature(group)).cloned().collect();
+    let kept: Vec<_> =
+        groups.iter().filter(|group| !is_feature_name(&group.name)).cloned().collect();
     let has_groups = !kept.is_empty();
     let regions = match args.regions {
         true => Some(found.regions(mesh, args.least_island)),
@@ -304,19 +301,11 @@ fn tags<const D: usize>(
     };
     let mut tags = Tags::new(mesh, kept, regions).map_err(Failure::content)?;
     if !has_groups {
-        tags = own_sides(mesh, loaded.frame.as_ref()).merge(tags).map_err(Failure::content)?;
+        tags = mesh_file::own_sides(mesh, loaded.frame.as_ref())
+            .merge(tags)
+            .map_err(Failure::content)?;
     }
     tags.merge(found.tags(mesh).map_err(Failure::content)?).map_err(Failure::content)
-}
-
-/// The sides of the image's box, or of the mesh's own where the image is not known.
-fn own_sides<const D: usize>(mesh: &Mesh<D>, frame: Option<&Frame<D>>) -> Tags<D> {
-    if let Some(frame) = frame {
-        let lattice = lattice_mesh(mesh, frame, Units::Physical);
-        return sides(&lattice, &frame.grid(Units::Physical).bounds(), frame.is_mirrored());
-    }
-    let bounds = Bounds::of(mesh.points());
-    bounds.map_or_else(Tags::default, |bounds| sides(mesh, &bounds, false))
 }
 
 fn write_tagged<const D: usize>(

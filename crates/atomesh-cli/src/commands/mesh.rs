@@ -77,9 +77,7 @@ Examples:
 pub fn run(args: MeshArgs, watch: &mut Progress) -> Result<String, Failure> {
     let mut run = args.run;
     if let Some(path) = &args.config {
-        let text = std::fs::read_to_string(path)
-            .map_err(|e| Failure::content(format!("cannot be read: {e}")).about(path))?;
-        run = run.or(RunConfig::parse(&text).map_err(|f| f.about(path))?);
+        run = run.or_file(path)?;
     }
     labels_alone(&mut run);
     run.check()?;

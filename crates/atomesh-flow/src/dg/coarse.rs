@@ -62,17 +62,7 @@ fn values_at_corners<const D: usize>(scheme: &Scheme<'_, D>) -> (Vec<u32>, usize
             sets.join(a, b);
         }
     }
-    let roots = sets.roots();
-    let mut numbers = vec![0; roots.len()];
-    let mut count = 0;
-    // a set's root is its lowest corner
-    for (at, &root) in roots.iter().enumerate() {
-        if root as usize == at {
-            numbers[at] = count;
-            count += 1;
-        } else {
-            numbers[at] = numbers[root as usize];
-        }
-    }
-    (numbers, count as usize)
+    let numbers = sets.numbers();
+    let count = numbers.iter().max().map_or(0, |&most| most as usize + 1);
+    (numbers, count)
 }

@@ -70,8 +70,7 @@ impl<'a, const D: usize> Setting<'a, D> {
         problem.permeability.check(grid.cell_count())?;
         let multipliers = multipliers(problem, grid)?;
         let conditions = conditions(problem, grid)?;
-        let roots = roots(grid, &multipliers);
-        let compartment_of = numbers(&roots);
+        let compartment_of = compartments(grid, &multipliers);
         let wells = place_wells(problem, grid, &multipliers)?;
         let source = |cell: usize| {
             problem.source.map_or(0.0, |q| cell_mean(grid, cell, &q) * grid.measures()[cell])
@@ -281,28 +280,13 @@ fn facets_named<'g, const D: usize>(grid: &'g Grid<D>, name: &str) -> Result<&'g
     }
 }
 
-/// The lowest cell of each cell's compartment.
-fn roots<const D: usize>(grid: &Grid<D>, multipliers: &[f64]) -> Vec<u32> {
+/// The compartment of each cell, numbered in the order of their lowest cells.
+fn compartments<const D: usize>(grid: &Grid<D>, multipliers: &[f64]) -> Vec<u32> {
     let mut sets = Sets::new(grid.cell_count());
     for (facet, &multiplier) in grid.facets().iter().zip(multipliers) {
         if let Some(other) = facet.neighbour.filter(|_| multiplier > 0.0) {
             sets.join(facet.cell, other);
         }
     }
-    sets.roots()
-}
-
-/// Numbers from 0 in the order of the roots, which are the lowest cells.
-fn numbers(roots: &[u32]) -> Vec<u32> {
-    let mut numbers = vec![0; roots.len()];
-    let mut count = 0;
-    for (cell, &root) in roots.iter().enumerate() {
-        if root as usize == cell {
-            numbers[cell] = count;
-            count += 1;
-        } else {
-            numbers[cell] = numbers[root as usize];
-        }
-    }
-    numbers
+    sets.numbers()
 }

@@ -211,6 +211,11 @@ fn feature<const D: usize>(
     (measure, feature)
 }
 
+/// Whether a group of facets has a name that [`FeatureSet::name`] gives.
+pub fn is_feature_name(name: &str) -> bool {
+    name.strip_prefix("feature-").is_some_and(|number| number.parse::<u32>().is_ok())
+}
+
 impl<const D: usize> FeatureSet<D> {
     /// The name of the feature with that place in the list.
     pub fn name(index: usize) -> String {

@@ -35,6 +35,29 @@ impl Sets {
         (0..self.0.len() as u32).map(|i| self.root(i)).collect()
     }
 
+    /// The set of each number, counted from 0 in the order of the sets' roots.
+    ///
+    /// ```
+    /// let mut sets = atomesh::geometry::Sets::new(4);
+    /// sets.join(1, 3);
+    /// assert_eq!(sets.numbers(), [0, 1, 2, 1]);
+    /// ```
+    pub fn numbers(&mut self) -> Vec<u32> {
+        let roots = self.roots();
+        let mut numbers = vec![0; roots.len()];
+        let mut count = 0;
+        for (i, &root) in roots.iter().enumerate() {
+            // the root of a set is its least number, and so counted before
+            if root as usize == i {
+                numbers[i] = count;
+                count += 1;
+            } else {
+                numbers[i] = numbers[root as usize];
+            }
+        }
+        numbers
+    }
+
     /// Makes the sets of two numbers one.
     pub fn join(&mut self, a: u32, b: u32) {
         let (a, b) = (self.root(a), self.root(b));

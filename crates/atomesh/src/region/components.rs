@@ -28,23 +28,7 @@ pub fn components<const D: usize>(mesh: &Mesh<D>, walls: &[[u32; D]]) -> Vec<i32
             parts.join(facet.cell, other);
         }
     }
-    numbered(&parts.roots())
-}
-
-/// The sets' numbers, from 1 in the order of their roots.
-fn numbered(roots: &[u32]) -> Vec<i32> {
-    let mut number = vec![0; roots.len()];
-    let mut count = 0;
-    for (cell, &root) in roots.iter().enumerate() {
-        // the root of a set is its lowest cell, and so numbered before
-        if root as usize == cell {
-            count += 1;
-            number[cell] = count;
-        } else {
-            number[cell] = number[root as usize];
-        }
-    }
-    number
+    parts.numbers().into_iter().map(|number| number as i32 + 1).collect()
 }
 
 #[cfg(test)]

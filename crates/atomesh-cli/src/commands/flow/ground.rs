@@ -3,7 +3,6 @@
 use std::path::Path;
 
 use atomesh::features::FeatureFacetOptions;
-use atomesh::geometry::Bounds;
 use atomesh::image::{Frame, Image, Units};
 use atomesh::mesh::{Mesh, Tags};
 use atomesh::pipeline::Outcome;
@@ -161,12 +160,12 @@ fn loaded_cells<const D: usize>(loaded: LoadedCells<D>) -> Ground<D> {
 fn loaded<const D: usize>(loaded: LoadedMesh<D>) -> Result<Ground<D>, Failure> {
     let LoadedMesh { mesh, tags, cell_fields, frame, provenance, .. } = loaded;
     let mesh = mesh_file::turned_right(mesh);
-    let tags = match Bounds::of(mesh.points()) {
-        Some(bounds) if tags.facet_group("xmin").is_none() => {
-            let tolerance = 1e-9 * bounds.extent().iter().fold(0.0_f64, |a, b| a.max(*b));
-            Tags::sides(&mesh, &bounds, tolerance).merge(tags).map_err(Failure::content)?
+    let tags = match tags.facet_group("xmin") {
+        Some(_) => tags,
+        None => {
+            let sides = mesh_file::own_sides(&mesh, frame.as_ref());
+            sides.merge(tags).map_err(Failure::content)?
         }
-        _ => tags,
     };
     Ok(Ground {
         body: Body::Simplices(mesh, tags),

@@ -216,9 +216,7 @@ pub fn run(args: FlowArgs, watch: &mut Progress) -> Result<String, Failure> {
         ..RunConfig::default()
     };
     if let Some(path) = &config {
-        let text = std::fs::read_to_string(path)
-            .map_err(|e| Failure::content(format!("cannot be read: {e}")).about(path))?;
-        run = run.or(RunConfig::parse(&text).map_err(|f| f.about(path))?);
+        run = run.or_file(path)?;
         run.output = OutputOptions::default();
     }
     let files = files::Files::new(&output, &run)?;

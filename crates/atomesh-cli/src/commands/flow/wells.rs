@@ -3,6 +3,7 @@
 use std::fmt;
 use std::str::FromStr;
 
+use atomesh::features::is_feature_name;
 use atomesh_flow::{Barrier, Boundary, Condition, Control, Value, Well};
 
 use crate::failure::Failure;
@@ -184,10 +185,7 @@ pub fn barriers<'n>(
     multiplier: f64,
     own: &[BarrierSpec],
 ) -> Vec<Barrier> {
-    let is_feature = |name: &&str| {
-        name.strip_prefix("feature-").is_some_and(|number| number.parse::<u32>().is_ok())
-    };
-    let of_features = names.filter(is_feature).map(|name| {
+    let of_features = names.filter(|name| is_feature_name(name)).map(|name| {
         let group = name.to_string();
         Barrier { group, multiplier }
     });
