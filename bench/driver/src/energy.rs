@@ -2,13 +2,12 @@
 
 use std::f64::consts::SQRT_2;
 
-use atomesh::distance::NominalDistance;
+use atomesh::energy::{Engine, PairsEngine, SampledEngine};
+use atomesh::fields::NominalDistance;
+use atomesh::fields::{ImageWeight, Interpolation, ScalarField};
 use atomesh::geometry::{Point, compact_order};
 use atomesh::image::Grid;
 use atomesh::lattice::{Crystal, GrowOptions, grow};
-use atomesh::potential::{
-    Engine, ImagePotential, ImageWeight, Interpolation, PairsEngine, SampledEngine,
-};
 use atomesh::watch::Silent;
 use clap::{Args, ValueEnum};
 use serde_json::Value;
@@ -55,7 +54,7 @@ pub struct Energy {
 
 /// What an engine is made of.
 struct Scenery {
-    potential: ImagePotential<3>,
+    potential: ScalarField<3>,
     weight: ImageWeight<3>,
     distance: NominalDistance<3>,
     /// In a compact order, as the pipeline has them.
@@ -111,7 +110,7 @@ fn image() -> Result<Scenery, Failure> {
     let crystal = Crystal::face_centered_cubic();
     let lattice = grow(&crystal, grid.bounds(), &distance, &GrowOptions::default(), &mut Silent)?;
     Ok(Scenery {
-        potential: ImagePotential::new(grid, samples, Interpolation::Linear)?,
+        potential: ScalarField::new(grid, samples, Interpolation::Linear)?,
         weight: ImageWeight::constant(0.5)?,
         distance,
         atoms: sorted(lattice.atoms()),
@@ -130,11 +129,7 @@ fn crystal(side: usize) -> Result<Scenery, Failure> {
         })
         .collect();
     Ok(Scenery {
-        potential: ImagePotential::new(
-            grid,
-            vec![0.0; grid.sample_count()],
-            Interpolation::Linear,
-        )?,
+        potential: ScalarField::new(grid, vec![0.0; grid.sample_count()], Interpolation::Linear)?,
         weight: ImageWeight::constant(0.0)?,
         distance: NominalDistance::constant(&grid, 1.0)?,
         atoms: sorted(&atoms),

@@ -2,7 +2,7 @@
 
 use std::path::PathBuf;
 
-use atomesh::distance::{GRADIENT_LIMIT, NominalDistance};
+use atomesh::fields::{GRADIENT_LIMIT, NominalDistance};
 use atomesh::image::Grid;
 use atomesh::lattice::{Crystal, GrowOptions, Scatterer, fill_holes, grow, settle};
 use atomesh::mesh::{Delaunay, Mesh};

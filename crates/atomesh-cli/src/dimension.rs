@@ -2,7 +2,7 @@
 
 use atomesh::image::Image;
 use atomesh::mesh::Mesh;
-use atomesh::pipeline::Method;
+use atomesh::run::Method;
 use atomesh::voronoi::PolyMesh;
 use atomesh_draw::{
     DrawError, FlowPicture, FlowStyle, Picture, Style, draw_flat, draw_flow, draw_flow_slices,

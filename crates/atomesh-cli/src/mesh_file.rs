@@ -5,7 +5,7 @@ use std::path::Path;
 use atomesh::geometry::Bounds;
 use atomesh::image::{Frame, Units};
 use atomesh::mesh::{Mesh, Tags};
-use atomesh::pipeline::{lattice_mesh, sides};
+use atomesh::run::{lattice_mesh, sides};
 use atomesh_io::mesh::{AnyMesh, MeshReadError, read_mesh};
 
 use crate::failure::Failure;

@@ -2,15 +2,15 @@
 
 use std::path::{Path, PathBuf};
 
-use atomesh::distance::DistanceError;
 use atomesh::enhance::{EnhanceError, Features};
+use atomesh::fields::DistanceError;
+use atomesh::fields::FieldError;
 use atomesh::image::Image;
 use atomesh::improve::ImproveError;
 use atomesh::lattice::LatticeError;
 use atomesh::optimize::OptimizeError;
-use atomesh::pipeline::{Inputs, PipelineError, Prepared, prepare};
-use atomesh::potential::PotentialError;
 use atomesh::region::RegionError;
+use atomesh::run::{Inputs, Prepared, RunError, prepare};
 use atomesh_io::image::ReadOptions;
 
 use crate::commands::is_option;
@@ -129,49 +129,47 @@ impl Meshing<'_> {
     }
 
     /// What the core refuses, in the user's terms.
-    pub fn failure(&self, error: PipelineError) -> Failure {
+    pub fn failure(&self, error: RunError) -> Failure {
         let lattice = &self.run.lattice;
         match &error {
             e if e.is_cancelled() => Failure::cancelled(),
-            PipelineError::LatticeDimension { .. } => Failure::misuse(error).about(self.path),
-            PipelineError::Lattice(LatticeError::SeedOutside { index, .. }) => {
+            RunError::LatticeDimension { .. } => Failure::misuse(error).about(self.path),
+            RunError::Lattice(LatticeError::SeedOutside { index, .. }) => {
                 let point = lattice.seed_point.iter().flatten().nth(*index);
                 let point = point.map_or_else(String::new, ToString::to_string);
                 Failure::misuse(format!("--seed-point {point} lies outside the image"))
                     .about(self.path)
                     .advise("places are in world coordinates; atomesh info IMAGE shows the box")
             }
-            PipelineError::Enhance(EnhanceError::OutOfRange { .. })
-            | PipelineError::Potential(PotentialError::OutOfRange { .. }) => {
+            RunError::Enhance(EnhanceError::OutOfRange { .. })
+            | RunError::Potential(FieldError::OutOfRange { .. }) => {
                 Failure::content(error).about(&self.potential_path())
             }
-            PipelineError::Enhance(EnhanceError::NotFinite { .. }) => {
+            RunError::Enhance(EnhanceError::NotFinite { .. }) => {
                 Failure::content(error).about(self.path)
             }
-            PipelineError::Potential(PotentialError::Weight { index: Some(_), .. }) => {
+            RunError::Potential(FieldError::Weight { index: Some(_), .. }) => {
                 field_failure(&error, self.run.input.beta_field.as_deref())
             }
-            PipelineError::Region(RegionError::Label { .. }) => {
+            RunError::Region(RegionError::Label { .. }) => {
                 field_failure(&error, self.run.input.labels.as_deref())
             }
-            PipelineError::Region(_) => field_failure(&error, self.run.input.mask.as_deref()),
-            PipelineError::Distance(_) if self.run.input.size_field.is_some() => {
+            RunError::Region(_) => field_failure(&error, self.run.input.mask.as_deref()),
+            RunError::Distance(_) if self.run.input.size_field.is_some() => {
                 field_failure(&error, self.run.input.size_field.as_deref())
             }
-            PipelineError::Distance(DistanceError::FieldValue { .. }) => Failure::content(error)
+            RunError::Distance(DistanceError::FieldValue { .. }) => Failure::content(error)
                 .about(self.path)
                 .advise("--frequency needs an image of velocities above 0"),
-            PipelineError::Distance(DistanceError::BelowStep { .. })
-                if lattice.frequency.is_some() =>
-            {
+            RunError::Distance(DistanceError::BelowStep { .. }) if lattice.frequency.is_some() => {
                 Failure::misuse(error)
                     .about(self.path)
                     .advise("choose a lower --frequency or fewer --points-per-wavelength")
             }
-            PipelineError::Distance(DistanceError::BelowStep { .. }) => Failure::misuse(error)
+            RunError::Distance(DistanceError::BelowStep { .. }) => Failure::misuse(error)
                 .about(self.path)
                 .advise("choose a greater --size, or resample the image"),
-            PipelineError::Shape { name, .. } => {
+            RunError::Shape { name, .. } => {
                 let path = match *name {
                     "size field" => self.run.input.size_field.as_deref(),
                     "mask" => self.run.input.mask.as_deref(),
@@ -180,19 +178,19 @@ impl Meshing<'_> {
                 };
                 field_failure(&error, path)
             }
-            PipelineError::Enhance(e) if is_option(e) => Failure::misuse(error),
-            PipelineError::Distance(_)
-            | PipelineError::Potential(PotentialError::Weight { .. })
-            | PipelineError::Lattice(LatticeError::SpacingFactor { .. })
-            | PipelineError::Optimize(OptimizeError::Option { .. })
-            | PipelineError::Improve(ImproveError::MinAngle { .. }) => Failure::misuse(error),
+            RunError::Enhance(e) if is_option(e) => Failure::misuse(error),
+            RunError::Distance(_)
+            | RunError::Potential(FieldError::Weight { .. })
+            | RunError::Lattice(LatticeError::SpacingFactor { .. })
+            | RunError::Optimize(OptimizeError::Option { .. })
+            | RunError::Improve(ImproveError::MinAngle { .. }) => Failure::misuse(error),
             _ => Failure::content(error).about(self.path),
         }
     }
 }
 
 /// The content of a field is wrong.
-fn field_failure(error: &PipelineError, path: Option<&Path>) -> Failure {
+fn field_failure(error: &RunError, path: Option<&Path>) -> Failure {
     let failure = Failure::content(error);
     match path {
         Some(path) => failure.about(path),

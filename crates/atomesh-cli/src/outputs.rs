@@ -6,7 +6,7 @@ use std::path::{Path, PathBuf};
 use atomesh::features::FeatureFacetOptions;
 use atomesh::image::{Image, Samples};
 use atomesh::mesh::{Mesh, Regions, Tags};
-use atomesh::pipeline::Outcome;
+use atomesh::run::Outcome;
 use atomesh::watch::{Phase, Watch};
 use atomesh_draw::{PictureFormat, Style};
 use atomesh_io::atomic_file::AtomicFile;

@@ -4,7 +4,7 @@ use std::path::Path;
 
 use atomesh::image::Image;
 use atomesh::mesh::Mesh;
-use atomesh::pipeline::MeshReport;
+use atomesh::run::MeshReport;
 use atomesh_draw::{ReportPage, Style};
 use serde_json::Value;
 

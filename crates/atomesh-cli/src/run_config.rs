@@ -2,16 +2,16 @@
 
 use std::path::{Path, PathBuf};
 
-use atomesh::distance::GradeBy;
 use atomesh::enhance::{
     EdgeCrestOptions, EdgeOperator, FaultOptions, FeatureOptions, HorizonOptions, Mixture,
     Polarity, RidgeOptions,
 };
+use atomesh::fields::GradeBy;
+use atomesh::fields::Interpolation;
 use atomesh::image::Units;
 use atomesh::improve::{Align, ImproveOptions};
 use atomesh::optimize::{EngineKind, OptimizeOptions};
-use atomesh::pipeline::{LatticeKind, MeshKind, MeshOptions, POINTS_PER_WAVELENGTH, Size};
-use atomesh::potential::Interpolation;
+use atomesh::run::{LatticeKind, MeshKind, MeshOptions, POINTS_PER_WAVELENGTH, Size};
 use serde::{Deserialize, Serialize};
 
 use crate::failure::Failure;

@@ -5,7 +5,7 @@ use std::ops::Range;
 use std::str::FromStr;
 
 use atomesh::image::Frame;
-use atomesh::pipeline::Size;
+use atomesh::run::Size;
 use clap::builder::{PossibleValuesParser, TypedValueParser};
 use serde::de::value::{Error as NameError, StrDeserializer};
 use serde::de::{DeserializeOwned, Error as _, IntoDeserializer};

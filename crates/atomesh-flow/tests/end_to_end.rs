@@ -5,7 +5,7 @@ use atomesh::features::FeatureFacetOptions;
 use atomesh::geometry::{Bounds, Point};
 use atomesh::image::{Frame, Image, Samples};
 use atomesh::mesh::{Delaunay, FacetGroup, Mesh, Tags};
-use atomesh::pipeline::{Inputs, MeshOptions, Method, Size, prepare};
+use atomesh::run::{Inputs, MeshOptions, Method, Size, prepare};
 use atomesh::watch::Silent;
 use atomesh_flow::dg::{self, DgOptions, DgSolution};
 use atomesh_flow::{Barrier, Boundary, Condition, Grid, Problem, Setting, Value};

@@ -1,6 +1,6 @@
 //! Making d(x) from a field and limiting its slope, samples per second.
 
-use atomesh::distance::NominalDistance;
+use atomesh::fields::NominalDistance;
 use atomesh::image::Grid;
 use criterion::{Criterion, Throughput, criterion_group, criterion_main};
 

@@ -5,13 +5,12 @@
 //! $ RAYON_NUM_THREADS=1 cargo bench -p atomesh --bench energy
 //! ```
 
-use atomesh::distance::NominalDistance;
+use atomesh::energy::{Engine, PairsEngine, SampledEngine};
+use atomesh::fields::NominalDistance;
+use atomesh::fields::{ImageWeight, Interpolation, ScalarField};
 use atomesh::geometry::{Point, compact_order};
 use atomesh::image::Grid;
 use atomesh::minimize::{Lbfgs, LbfgsOptions, Objective};
-use atomesh::potential::{
-    Engine, ImagePotential, ImageWeight, Interpolation, PairsEngine, SampledEngine,
-};
 use criterion::{Criterion, Throughput, criterion_group, criterion_main};
 
 /// Nominal distance, in samples.
@@ -37,7 +36,7 @@ fn crystal(side: usize) -> Vec<Point<3>> {
 fn engines(criterion: &mut Criterion) {
     let grid = Grid { shape: [256; 3], step: [1.0; 3] };
     let samples = (0..grid.sample_count()).map(|i| -((i * 31 % 101) as f32) / 101.0).collect();
-    let Ok(potential) = ImagePotential::new(grid, samples, Interpolation::Linear) else { return };
+    let Ok(potential) = ScalarField::new(grid, samples, Interpolation::Linear) else { return };
     let Ok(distance) = NominalDistance::constant(&grid, DISTANCE) else { return };
     let Ok(weight) = ImageWeight::constant(0.5) else { return };
     let atoms = crystal(256);

@@ -3,7 +3,7 @@
 
 use std::f64::consts::TAU;
 
-use atomesh::distance::NominalDistance;
+use atomesh::fields::NominalDistance;
 use atomesh::image::Grid;
 use atomesh::lattice::{Crystal, GrowOptions, Lattice, Scatterer, fill_holes, grow, settle};
 use atomesh::mesh::{Delaunay, Mesh};

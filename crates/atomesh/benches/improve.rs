@@ -1,13 +1,14 @@
 //! Improving tetrahedra: the slivers of a mesh without features, and facets of one with a sphere.
 
-use atomesh::distance::NominalDistance;
 use atomesh::enhance::{FeatureOptions, Features, enhance};
+use atomesh::fields::Fields;
+use atomesh::fields::NominalDistance;
+use atomesh::fields::{ImageWeight, Interpolation, ScalarField};
 use atomesh::image::Units;
 use atomesh::improve::{Align, ImproveOptions, Improver, Space};
 use atomesh::lattice::{Crystal, GrowOptions, grow};
 use atomesh::mesh::Delaunay;
-use atomesh::optimize::{Fields, OptimizeOptions, optimize};
-use atomesh::potential::{ImagePotential, ImageWeight, Interpolation};
+use atomesh::optimize::{OptimizeOptions, optimize};
 use atomesh::synth::{Scene, SynthOptions, synthesize};
 use atomesh::watch::Silent;
 use criterion::{Criterion, criterion_group, criterion_main};
@@ -17,7 +18,7 @@ fn benches(criterion: &mut Criterion) {
     let edges = FeatureOptions { features: Features::Edges, ..Default::default() };
     let b = enhance(&image, &edges, &mut Silent).expect("edges").values;
     let grid = image.frame().grid(Units::Physical);
-    let potential = ImagePotential::new(grid, b, Interpolation::Linear).expect("a potential");
+    let potential = ScalarField::new(grid, b, Interpolation::Linear).expect("a potential");
     let weight = ImageWeight::constant(0.45).expect("a weight");
     let distance = NominalDistance::constant(&grid, 4.0).expect("a distance");
     let fields = Fields { potential: &potential, weight: &weight, distance: &distance };

@@ -1,6 +1,6 @@
 //! Growing lattices, atoms per second, and putting them along a curve.
 
-use atomesh::distance::NominalDistance;
+use atomesh::fields::NominalDistance;
 use atomesh::geometry::hilbert_order;
 use atomesh::image::Grid;
 use atomesh::lattice::{Crystal, GrowOptions, grow};

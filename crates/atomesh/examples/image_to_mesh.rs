@@ -2,7 +2,7 @@
 //!
 //! `cargo run --release --example image_to_mesh`
 
-use atomesh::pipeline::{Inputs, MeshOptions, Method, Size, prepare};
+use atomesh::run::{Inputs, MeshOptions, Method, Size, prepare};
 use atomesh::synth::{Scene, SynthOptions, synthesize};
 use atomesh::watch::Silent;
 

@@ -3,7 +3,7 @@
 //! `cargo run --release --example own_potential`
 
 use atomesh::image::{Frame, Image, Samples};
-use atomesh::pipeline::{Inputs, MeshOptions, Method, Size, prepare};
+use atomesh::run::{Inputs, MeshOptions, Method, Size, prepare};
 use atomesh::watch::Silent;
 
 fn main() -> Result<(), Box<dyn std::error::Error>> {

@@ -4,7 +4,7 @@
 
 use std::ops::ControlFlow;
 
-use atomesh::pipeline::{Inputs, MeshOptions, Method, prepare};
+use atomesh::run::{Inputs, MeshOptions, Method, prepare};
 use atomesh::synth::{Scene, SynthOptions, synthesize};
 use atomesh::watch::{Phase, Watch};
 

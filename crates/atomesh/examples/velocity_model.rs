@@ -8,7 +8,7 @@
 use std::f64::consts::TAU;
 use std::time::Instant;
 
-use atomesh::distance::NominalDistance;
+use atomesh::fields::NominalDistance;
 use atomesh::image::Grid;
 use atomesh::lattice::{Crystal, GrowOptions, Scatterer, fill_holes, grow, settle};
 use atomesh::measure::shape;

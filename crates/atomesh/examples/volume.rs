@@ -3,7 +3,7 @@
 //! `cargo run --release --example volume`
 
 use atomesh::enhance::{FeatureOptions, Features};
-use atomesh::pipeline::{Inputs, MeshOptions, Method, Size, prepare};
+use atomesh::run::{Inputs, MeshOptions, Method, Size, prepare};
 use atomesh::synth::{Scene, SynthOptions, synthesize};
 use atomesh::watch::Silent;
 

@@ -8,18 +8,17 @@
 
 pub mod geometry;
 pub mod watch;
-pub mod pair;
 pub mod minimize;
 pub mod image;
+pub mod fields;
+pub mod crests;
 pub mod synth;
 pub mod enhance;
 pub mod mesh;
-pub mod distance;
-pub mod potential;
+pub mod energy;
 pub mod region;
 pub mod lattice;
 pub mod optimize;
-pub mod valley;
 pub mod mirror;
 pub mod improve;
 pub mod edit;
@@ -27,7 +26,7 @@ pub mod features;
 pub mod sample;
 pub mod voronoi;
 pub mod measure;
-pub mod pipeline;
+pub mod run;
 
 /// Compiles and runs the code in the README.
 #[cfg(doctest)]

@@ -8,8 +8,8 @@ use atomesh::geometry::{Point, difference, dot};
 use atomesh::image::{Frame, Image, Samples};
 use atomesh::measure::shapes;
 use atomesh::mesh::Mesh;
-use atomesh::pipeline::{Inputs, MeshOptions, Method, Outcome, PipelineError, Size, prepare};
 use atomesh::region::RegionError;
+use atomesh::run::{Inputs, MeshOptions, Method, Outcome, RunError, Size, prepare};
 use atomesh::watch::Silent;
 
 /// An image of a function of the sample's index.
@@ -41,7 +41,7 @@ fn run<const D: usize>(
     method: &Method<D>,
     inputs: Inputs<'_, D>,
     options: MeshOptions<D>,
-) -> Result<Outcome<D>, PipelineError> {
+) -> Result<Outcome<D>, RunError> {
     prepare(method, inputs, options, &mut Silent)?.run(&mut Silent)
 }
 
@@ -216,7 +216,7 @@ fn empty_and_tiny_masks_are_refused_and_full_ones_change_nothing() {
         run(&Method::flat(), Inputs { mask: Some(mask), ..Inputs::image(&picture) }, options(6.0))
     };
     let region = |error| match error {
-        PipelineError::Region(error) => error,
+        RunError::Region(error) => error,
         other => panic!("{other}"),
     };
     let empty = region(mesh(&image([64, 48], |_| 0)).unwrap_err());

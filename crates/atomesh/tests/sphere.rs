@@ -4,7 +4,7 @@ use atomesh::enhance::{FeatureOptions, Features};
 use atomesh::geometry::distance_squared;
 use atomesh::improve::{Align, ImproveOptions};
 use atomesh::mesh::Mesh;
-use atomesh::pipeline::{Inputs, MeshOptions, Method, Size, prepare};
+use atomesh::run::{Inputs, MeshOptions, Method, Size, prepare};
 use atomesh::synth::{Geometry, Scene, SynthOptions, synthesize};
 use atomesh::watch::Silent;
 

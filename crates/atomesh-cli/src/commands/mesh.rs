@@ -5,7 +5,7 @@ use std::path::{Path, PathBuf};
 use atomesh::image::Image;
 use atomesh::improve::ImproveReport;
 use atomesh::measure::{AlignmentReport, ShapeReport, shape};
-use atomesh::pipeline::{MeshReport, Outcome, PipelineError, Prepared, VoronoiReport};
+use atomesh::run::{MeshReport, Outcome, Prepared, RunError, VoronoiReport};
 use atomesh::voronoi::PolyReport;
 use atomesh_io::image::AnyImage;
 use serde_json::json;
@@ -178,7 +178,7 @@ impl Job<'_> {
             return Ok(Figures::default());
         }
         let shape = shape(outcome.mesh(), outcome.bounds().as_ref(), watch);
-        let shape = shape.map_err(|e| self.meshing().failure(PipelineError::Measure(e)))?;
+        let shape = shape.map_err(|e| self.meshing().failure(RunError::Measure(e)))?;
         Ok(Figures { shape: Some(shape), ..Figures::default() })
     }
 

@@ -6,7 +6,7 @@ use atomesh::enhance::given_potential;
 use atomesh::image::{Image, Samples, Units};
 use atomesh::measure::{WantedSize, fidelity, homogeneity};
 use atomesh::mesh::Mesh;
-use atomesh::pipeline::{MeshReport, lattice_mesh};
+use atomesh::run::{MeshReport, lattice_mesh};
 use atomesh_draw::Style;
 use atomesh_io::image::ImageFormat;
 use atomesh_io::mesh::{AnyMesh, LoadedMesh};

@@ -1,6 +1,6 @@
 //! The figures of a report: each with its unit and what it means.
 
-use atomesh::pipeline::MeshReport;
+use atomesh::run::MeshReport;
 
 use super::text::{grouped, real};
 

@@ -12,7 +12,7 @@ mod tests;
 
 use std::fmt::Write;
 
-use atomesh::pipeline::MeshReport;
+use atomesh::run::MeshReport;
 use base64::Engine;
 use base64::engine::general_purpose::STANDARD;
 

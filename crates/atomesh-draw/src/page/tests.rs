@@ -3,7 +3,7 @@
 use atomesh::image::{Frame, Grid, Image, Samples};
 use atomesh::measure::{Histogram, WantedSize};
 use atomesh::mesh::Mesh;
-use atomesh::pipeline::MeshReport;
+use atomesh::run::MeshReport;
 use atomesh::watch::Silent;
 
 use super::chart::Chart;

@@ -8,11 +8,12 @@ mod cells;
 #[cfg(test)]
 mod tests;
 
+use crate::energy::pair;
+use crate::fields::Fields;
 use crate::geometry::{Bounds, Point, distance_squared};
 use crate::lattice::Lattice;
 use crate::mesh::{ConnectError, Delaunay, Mesh};
-use crate::optimize::{Fields, OptimizeError, OptimizeOptions, OptimizeReport, optimize};
-use crate::pair;
+use crate::optimize::{OptimizeError, OptimizeOptions, OptimizeReport, optimize};
 use crate::watch::Watch;
 
 use cells::{Cells, Change};
@@ -83,7 +84,7 @@ pub enum EditError {
 /// use atomesh::edit::Editor;
 /// use atomesh::image::Image;
 /// use atomesh::mesh::Delaunay;
-/// # use atomesh::distance::NominalDistance;
+/// # use atomesh::fields::NominalDistance;
 /// # use atomesh::lattice::{Crystal, GrowOptions, grow};
 /// # use atomesh::image::Grid;
 /// # use atomesh::watch::Silent;

@@ -3,10 +3,10 @@ use rand::{RngExt, SeedableRng};
 use rand_pcg::Pcg64;
 
 use super::*;
-use crate::distance::NominalDistance;
+use crate::fields::NominalDistance;
+use crate::fields::{ImageWeight, Interpolation, ScalarField};
 use crate::image::Grid;
 use crate::lattice::{Crystal, GrowOptions, grow};
-use crate::potential::{ImagePotential, ImageWeight, Interpolation};
 use crate::watch::Silent;
 
 const D_NOMINAL: f64 = 4.0;
@@ -106,7 +106,7 @@ fn relaxing_moves_what_is_near<const D: usize>(crystal: &Crystal<D>, delaunay: D
     // a sheet x = 6.6 attracts
     let b = |i: usize| -(-(((i % 17) as f32 - 6.6) / 1.5).powi(2)).exp();
     let samples = (0..grid.sample_count()).map(b).collect();
-    let potential = ImagePotential::new(grid, samples, Interpolation::Linear).unwrap();
+    let potential = ScalarField::new(grid, samples, Interpolation::Linear).unwrap();
     let weight = ImageWeight::constant(0.4).unwrap();
     let distance = NominalDistance::constant(&grid, D_NOMINAL).unwrap();
     let fields = Fields { potential: &potential, weight: &weight, distance: &distance };

@@ -3,9 +3,9 @@
 use rayon::prelude::*;
 
 use super::{FacetTest, FeaturesError};
+use crate::fields::ScalarField;
 use crate::geometry::{Point, distance_squared};
 use crate::mesh::{Facet, Mesh};
-use crate::potential::ImagePotential;
 use crate::watch::{Phase, Watch, check};
 
 /// Facets between two looks at the watch, a fixed number so that results do not depend on threads.
@@ -36,7 +36,7 @@ impl<const D: usize> FacetField<D> {
     /// [`FeaturesError::Cancelled`] if the watch ends the work.
     pub fn along(
         mesh: &Mesh<D>,
-        potential: &ImagePotential<D>,
+        potential: &ScalarField<D>,
         watch: &mut dyn Watch,
     ) -> Result<Self, FeaturesError> {
         let facets = inner_facets(mesh);

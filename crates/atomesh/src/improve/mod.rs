@@ -15,8 +15,8 @@ mod space;
 pub use plane::PlaneImprover;
 pub use space::Space;
 
+use crate::fields::Fields;
 use crate::mesh::{Mesh, MeshError};
-use crate::optimize::Fields;
 use crate::watch::{Cancelled, Watch};
 
 /// How facets are aligned with features once the atoms are connected.

@@ -8,7 +8,7 @@
 //! again from the boundary. Coordinates are snapped to binary fractions, so that a perfect crystal stays
 //! perfect. Cost: O(atoms). Deterministic.
 
-use crate::distance::NominalDistance;
+use crate::fields::NominalDistance;
 use crate::geometry::{Bounds, Point, distance_squared};
 use crate::mesh::MOST_POINTS;
 use crate::region::Outline;

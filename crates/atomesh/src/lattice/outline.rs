@@ -7,7 +7,7 @@
 
 use rayon::prelude::*;
 
-use crate::distance::NominalDistance;
+use crate::fields::NominalDistance;
 use crate::geometry::{Point, difference, dot};
 use crate::mesh::{ConnectError, Delaunay, Mesh, merge_duplicates};
 use crate::region::{Outline, free_axes};

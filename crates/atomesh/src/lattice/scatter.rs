@@ -12,7 +12,7 @@ use rand::{RngExt, SeedableRng};
 use rand_pcg::Pcg64;
 use rayon::prelude::*;
 
-use crate::distance::NominalDistance;
+use crate::fields::NominalDistance;
 use crate::geometry::linear::solve;
 use crate::geometry::{Bounds, Point, difference, distance_squared, dot};
 use crate::mesh::{ConnectError, Delaunay, Mesh};

@@ -9,7 +9,7 @@ use rayon::prelude::*;
 
 use super::grow::LatticeError;
 use super::{Lattice, Scatterer};
-use crate::distance::NominalDistance;
+use crate::fields::NominalDistance;
 use crate::geometry::{Point, Simplex};
 use crate::watch::{Phase, Watch, check};
 

@@ -3,7 +3,7 @@
 use std::ops::ControlFlow;
 
 use super::*;
-use crate::distance::NominalDistance;
+use crate::fields::NominalDistance;
 use crate::geometry::{difference, distance_squared, dot};
 use crate::image::Grid;
 use crate::mesh::{Delaunay, Mesh};

@@ -5,7 +5,7 @@ use rand_pcg::Pcg64;
 
 use super::grow::{Boundary, GrowOptions, Place, grow, restart_room};
 use super::{Crystal, Lattice};
-use crate::distance::NominalDistance;
+use crate::fields::NominalDistance;
 use crate::geometry::{Bounds, Point, distance_squared};
 use crate::image::Grid;
 use crate::watch::Silent;

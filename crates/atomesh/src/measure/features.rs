@@ -2,11 +2,11 @@
 //!
 //! Only what a mesh with edges of length d can be asked to follow counts: valleys of b smoothed by
 //! σ = max(1, d/6) samples, deeper than 1/4, that hang together, corner to corner, in groups of at least 4d
-//! (2-D) or 6d² (3-D) samples. [`crate::valley`] finds them.
+//! (2-D) or 6d² (3-D) samples. [`crate::crests`] finds them.
 
 use super::MeasureError;
+use crate::crests::{Search, bottoms, in_large_groups};
 use crate::geometry::Point;
-use crate::valley::{Search, bottoms, in_large_groups};
 use crate::watch::{Phase, Watch};
 
 /// A valley must be deeper than this, of 1.

@@ -1,8 +1,8 @@
 //! The crests of b: where faces should fall.
 
+use crate::crests::{Bottom, Search, bottoms, in_large_groups};
+use crate::fields::Fields;
 use crate::geometry::{Point, dot};
-use crate::optimize::Fields;
-use crate::valley::{Bottom, Search, bottoms, in_large_groups};
 use crate::watch::{Cancelled, Phase, Watch};
 
 /// The least height that counts at all: below it lies what a nearly constant image has.

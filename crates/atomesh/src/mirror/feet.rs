@@ -2,7 +2,7 @@
 
 use rayon::prelude::*;
 
-use crate::distance::NominalDistance;
+use crate::fields::NominalDistance;
 use crate::geometry::{Bounds, Point, distance_squared, dot};
 use crate::watch::{Cancelled, Phase, Watch, check};
 

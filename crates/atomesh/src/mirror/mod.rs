@@ -26,9 +26,10 @@ pub use crests::{Crest, crests};
 
 use rayon::prelude::*;
 
+use crate::fields::Fields;
+use crate::fields::ImageWeight;
 use crate::lattice::{Lattice, LatticeError, Scatterer, fill_holes};
-use crate::optimize::{Fields, OptimizeError, OptimizeOptions, OptimizeReport, optimize};
-use crate::potential::ImageWeight;
+use crate::optimize::{OptimizeError, OptimizeOptions, OptimizeReport, optimize};
 use crate::watch::{Cancelled, Phase, Watch, check};
 
 use pairs::Pairs;

@@ -1,6 +1,6 @@
 //! Pairs of atoms, mirror images of each other in a feature.
 
-use crate::distance::NominalDistance;
+use crate::fields::NominalDistance;
 use crate::geometry::{Bounds, Point, difference, distance_squared, dot};
 use crate::lattice::Lattice;
 

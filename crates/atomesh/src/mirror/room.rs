@@ -1,6 +1,6 @@
 //! Where only the atoms of pairs may be.
 
-use crate::distance::NominalDistance;
+use crate::fields::NominalDistance;
 use crate::geometry::{Bounds, Point, distance_squared};
 
 use super::bins::Bins;

@@ -2,10 +2,10 @@
 
 use rayon::prelude::*;
 
+use crate::energy::{Energy, Engine};
 use crate::geometry::{Bounds, Point};
 use crate::lattice::Lattice;
 use crate::minimize::Objective;
-use crate::potential::{Energy, Engine};
 
 /// An [`Objective`] whose variables are the atoms' coordinates.
 ///

@@ -16,11 +16,12 @@ pub use report::{EngineKind, OptimizeReport, Stage, Stop};
 use rand::{RngExt, SeedableRng};
 use rand_pcg::Pcg64;
 
-use crate::distance::NominalDistance;
+use crate::energy::{Engine, PairsEngine, SampledEngine};
+
+use crate::fields::{Fields, ScalarField};
 use crate::image::gaussian;
 use crate::lattice::Lattice;
 use crate::minimize::{Lbfgs, LbfgsOptions, Objective, Step};
-use crate::potential::{Engine, ImagePotential, ImageWeight, PairsEngine, SampledEngine};
 use crate::watch::{Cancelled, Phase, Watch, check};
 
 use energy::LatticeEnergy;
@@ -131,17 +132,6 @@ impl OptimizeOptions {
     }
 }
 
-/// The fields that atoms move in.
-#[derive(Clone, Copy)]
-pub struct Fields<'a, const D: usize> {
-    /// b(x).
-    pub potential: &'a ImagePotential<D>,
-    /// β(x).
-    pub weight: &'a ImageWeight<D>,
-    /// d(x).
-    pub distance: &'a NominalDistance<D>,
-}
-
 /// A lattice whose atoms have been moved, and how.
 #[derive(Clone, Debug)]
 pub struct OptimizedLattice<const D: usize> {
@@ -193,12 +183,12 @@ pub fn optimize<const D: usize>(
 }
 
 /// The potential smoothed by a Gaussian of `sigma` lattice units.
-fn smoothed<const D: usize>(potential: &ImagePotential<D>, sigma: f64) -> ImagePotential<D> {
+fn smoothed<const D: usize>(potential: &ScalarField<D>, sigma: f64) -> ScalarField<D> {
     let grid = *potential.grid();
     let mut samples = potential.samples().to_vec();
     gaussian(&mut samples, grid.shape, grid.step.map(|s| sigma / s));
     samples.iter_mut().for_each(|b| *b = b.clamp(-1.0, 1.0)); // rounding may step over
-    ImagePotential::new(grid, samples, potential.interpolation())
+    ScalarField::new(grid, samples, potential.interpolation())
         .expect("a mean of values within −1…1 is within it")
 }
 

@@ -1,6 +1,6 @@
 //! What a run of the optimizer did.
 
-use crate::potential::Energy;
+use crate::energy::Energy;
 
 /// What computes the energy.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, serde::Serialize, serde::Deserialize)]

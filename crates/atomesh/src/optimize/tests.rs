@@ -2,15 +2,18 @@
 
 use std::ops::ControlFlow;
 
+use crate::fields::{ImageWeight, NominalDistance};
+
 use super::*;
+use crate::energy::direct_energy;
+use crate::fields::Interpolation;
 use crate::geometry::{Point, distance_squared};
 use crate::image::Grid;
 use crate::lattice::{Crystal, GrowOptions, ScatterOptions, Scatterer, grow, scatter};
-use crate::potential::{Interpolation, direct_energy};
 use crate::watch::Silent;
 
 struct Scene<const D: usize> {
-    potential: ImagePotential<D>,
+    potential: ScalarField<D>,
     weight: ImageWeight<D>,
     distance: NominalDistance<D>,
 }
@@ -32,7 +35,7 @@ impl<const D: usize> Scene<D> {
     fn new(shape: [usize; D], b: impl Fn(&Point<D>) -> f64, beta: f64, d: f64) -> Self {
         let grid = Grid { shape, step: [1.0; D] };
         Self {
-            potential: ImagePotential::new(grid, sample(&grid, b), Interpolation::Linear).unwrap(),
+            potential: ScalarField::new(grid, sample(&grid, b), Interpolation::Linear).unwrap(),
             weight: ImageWeight::constant(beta).unwrap(),
             distance: NominalDistance::constant(&grid, d).unwrap(),
         }
@@ -66,7 +69,7 @@ impl<const D: usize> Scene<D> {
         optimize(lattice, self.fields(), options, &mut Silent).unwrap()
     }
 
-    fn direct(&self, lattice: &Lattice<D>) -> crate::potential::Energy {
+    fn direct(&self, lattice: &Lattice<D>) -> crate::energy::Energy {
         let d: Vec<f64> = lattice.atoms().iter().map(|p| self.distance.at(p)).collect();
         let weights: Vec<f64> = lattice.atoms().iter().map(|p| self.weight.at(p)).collect();
         let mut gradient = vec![[0.0; D]; lattice.len()];

@@ -22,9 +22,9 @@ pub use smooth::{fit, smooth};
 pub(crate) use trim::free_axes;
 pub use trim::{Trimmed, outline_facets, trim};
 
-use crate::distance::DistanceError;
+use crate::fields::DistanceError;
+use crate::fields::FieldError;
 use crate::mesh::MeshError;
-use crate::potential::PotentialError;
 use crate::watch::Cancelled;
 
 /// Why a region could not be made.
@@ -67,7 +67,7 @@ pub enum RegionError {
     Distance(#[from] DistanceError),
     /// The mask makes no field.
     #[error(transparent)]
-    Potential(#[from] PotentialError),
+    Potential(#[from] FieldError),
     /// The result was no mesh.
     #[error(transparent)]
     Mesh(#[from] MeshError),

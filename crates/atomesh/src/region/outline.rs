@@ -6,10 +6,10 @@
 //! there less its mean, far less than d. The logit of the smoothed mask is nearly linear in the distance from a
 //! straight edge, so that Newton's method finds the nearest outline in two or three steps.
 
-use crate::distance::NominalDistance;
+use crate::fields::NominalDistance;
+use crate::fields::{Interpolation, ScalarField};
 use crate::geometry::{Bounds, Point, distance_squared, dot};
 use crate::image::{Grid, Image, Samples, gaussian};
-use crate::potential::{ImagePotential, Interpolation};
 use crate::watch::{Phase, Watch, check};
 
 use super::RegionError;
@@ -28,7 +28,7 @@ const STEP_LIMIT: usize = 30;
 #[derive(Clone, Debug)]
 pub struct Outline<const D: usize> {
     /// The smoothed and shifted mask, 0…1.
-    share: ImagePotential<D>,
+    share: ScalarField<D>,
     bounds: Bounds<D>,
     /// The distance from the mask and `offset` more, up to some nominal distances.
     beyond: NominalDistance<D>,
@@ -70,7 +70,7 @@ impl<const D: usize> Outline<D> {
         share.iter_mut().for_each(|s| *s = s.clamp(0.0, 1.0)); // rounding may step over
         shift(&mut share, whole, sigma.into_iter().fold(f64::INFINITY, f64::min));
         let sample_share = whole / share.len() as f64;
-        let share = ImagePotential::new(grid, share, Interpolation::Spline)?;
+        let share = ScalarField::new(grid, share, Interpolation::Spline)?;
         check(watch, Phase::Distance, 0.8, None)?;
         Ok(Some(Self { share, bounds: grid.bounds(), beyond, offset, sample_share }))
     }

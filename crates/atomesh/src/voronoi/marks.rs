@@ -3,8 +3,8 @@
 use rayon::prelude::*;
 
 use super::poly_mesh::PolyMesh;
+use crate::fields::ScalarField;
 use crate::geometry::{Point, Sets, difference, dot};
-use crate::potential::ImagePotential;
 
 /// Faces that one task looks at.
 const BLOCK: usize = 1 << 10;
@@ -30,7 +30,7 @@ const FALL: f64 = 0.9;
 /// at most a sample apart.
 pub fn feature_faces<const D: usize>(
     mesh: &PolyMesh<D>,
-    potential: &ImagePotential<D>,
+    potential: &ScalarField<D>,
     least: f64,
     least_area: f64,
 ) -> FeatureFaces {
@@ -110,7 +110,7 @@ fn close_gaps<const D: usize>(
 /// Whether |b| falls from the face to both sides.
 fn is_along<const D: usize>(
     mesh: &PolyMesh<D>,
-    potential: &ImagePotential<D>,
+    potential: &ScalarField<D>,
     face: usize,
     strength: f64,
     step: f64,
@@ -125,7 +125,7 @@ fn is_along<const D: usize>(
 /// The mean of |b| over a face that is moved by a vector; values outside the image are those at its border.
 fn strength<const D: usize>(
     mesh: &PolyMesh<D>,
-    potential: &ImagePotential<D>,
+    potential: &ScalarField<D>,
     face: usize,
     way: Point<D>,
     step: f64,
@@ -142,7 +142,7 @@ fn strength<const D: usize>(
 }
 
 /// The mean of |b| over a segment or triangle, at the middles of equal parts.
-fn mean<const D: usize>(potential: &ImagePotential<D>, simplex: &[Point<D>; D], step: f64) -> f64 {
+fn mean<const D: usize>(potential: &ScalarField<D>, simplex: &[Point<D>; D], step: f64) -> f64 {
     let side = |k: usize| {
         let v = difference(&simplex[k], &simplex[0]);
         dot(&v, &v).sqrt()

@@ -1,7 +1,7 @@
 use super::*;
+use crate::fields::ScalarField;
 use crate::geometry::{difference, distance_squared, dot};
 use crate::image::Grid;
-use crate::potential::ImagePotential;
 use crate::watch::Silent;
 use proptest::prelude::*;
 use rand::{RngExt, SeedableRng};
@@ -339,7 +339,7 @@ fn validate_names_what_is_broken() {
 }
 
 /// A feature of standard deviation `width`, 1 on the plane y = `height` of a cube of `side` samples.
-fn sheet<const D: usize>(side: usize, height: f64, width: f64) -> ImagePotential<D> {
+fn sheet<const D: usize>(side: usize, height: f64, width: f64) -> ScalarField<D> {
     let grid = Grid { shape: [side + 1; D], step: [1.0; D] };
     let value = |n: usize| {
         let p: Point<D> =
@@ -348,7 +348,7 @@ fn sheet<const D: usize>(side: usize, height: f64, width: f64) -> ImagePotential
         (-0.5 * s * s).exp() as f32
     };
     let samples = (0..(side + 1).pow(D as u32)).map(value).collect();
-    ImagePotential::new(grid, samples, Default::default()).unwrap()
+    ScalarField::new(grid, samples, Default::default()).unwrap()
 }
 
 fn faces_lie_along_features<const D: usize>()

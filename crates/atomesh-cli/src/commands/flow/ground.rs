@@ -5,7 +5,7 @@ use std::path::Path;
 use atomesh::features::FeatureFacetOptions;
 use atomesh::image::{Frame, Image, Units};
 use atomesh::mesh::{Mesh, Tags};
-use atomesh::pipeline::Outcome;
+use atomesh::run::Outcome;
 use atomesh::voronoi::{FeatureFaces, PolyMesh};
 use atomesh_flow::dg::{self, Form};
 use atomesh_flow::{FlowError, Grid, Problem, Setting, two_point};

@@ -5,7 +5,7 @@
 //! middle if the four cells around that cost less than the two had. Only what features or the floor
 //! have reached is looked at.
 
-use crate::distance::NominalDistance;
+use crate::fields::NominalDistance;
 use crate::geometry::{Point, distance_squared};
 
 use super::energy::Energy;

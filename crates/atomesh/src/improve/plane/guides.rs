@@ -4,10 +4,10 @@
 //! makes max(1, d/6) in all. Valleys pull alike, whatever their depth; which are deep enough is measured
 //! against the deepest tenth of them, since smoothing thin features took most of their depth.
 
+use crate::crests::{Bottom, Search, bottoms, in_large_groups};
+use crate::fields::Fields;
+use crate::fields::ScalarField;
 use crate::geometry::Point;
-use crate::optimize::Fields;
-use crate::potential::ImagePotential;
-use crate::valley::{Bottom, Search, bottoms, in_large_groups};
 use crate::watch::{Cancelled, Phase, Watch};
 
 /// The least depth that counts at all: below it lies what a nearly constant image has.
@@ -68,7 +68,7 @@ pub(super) fn guides(
 
 /// The bottoms of valleys that edges of `size` samples should follow.
 fn deep_valleys(
-    potential: &ImagePotential<2>,
+    potential: &ScalarField<2>,
     size: f64,
     watch: &mut dyn Watch,
 ) -> Result<Vec<Bottom<2>>, Cancelled> {

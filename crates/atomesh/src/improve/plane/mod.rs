@@ -26,8 +26,8 @@ mod tests;
 mod triangles;
 
 use super::{Align, ImproveError, ImproveOptions, ImproveReport, Improver};
+use crate::fields::Fields;
 use crate::mesh::Mesh;
-use crate::optimize::Fields;
 use crate::watch::{Phase, Watch, check};
 
 use energy::Energy;

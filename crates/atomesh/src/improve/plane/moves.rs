@@ -7,7 +7,7 @@
 
 use rayon::prelude::*;
 
-use crate::distance::NominalDistance;
+use crate::fields::NominalDistance;
 use crate::geometry::{Point, difference, distance_squared, dot};
 
 use super::energy::{Energy, least_sine};

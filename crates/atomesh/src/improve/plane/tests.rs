@@ -8,13 +8,13 @@ use super::PlaneImprover;
 use super::energy::{Edge, Energy, Shape, least_sine};
 use super::guides::{Guide, guides};
 use super::triangles::Triangles;
-use crate::distance::NominalDistance;
+use crate::fields::Fields;
+use crate::fields::NominalDistance;
+use crate::fields::{ImageWeight, Interpolation, ScalarField};
 use crate::geometry::{Bounds, Point, difference, dot};
 use crate::image::Grid;
 use crate::lattice::{Crystal, GrowOptions, grow};
 use crate::mesh::{Delaunay, Mesh};
-use crate::optimize::Fields;
-use crate::potential::{ImagePotential, ImageWeight, Interpolation};
 use crate::watch::Silent;
 
 /// A line through the middle of the box, leaning by `angle` degrees.
@@ -37,7 +37,7 @@ impl Line {
 
 /// What a mesh is improved for.
 struct Scene {
-    potential: ImagePotential<2>,
+    potential: ScalarField<2>,
     weight: ImageWeight<2>,
     distance: NominalDistance<2>,
     line: Line,
@@ -56,7 +56,7 @@ impl Scene {
             let p = [(i % columns) as f64 * grid.step[0], (i / columns) as f64 * grid.step[1]];
             (-depth * (-0.5 * (line.off(&p) / 1.5).powi(2)).exp()) as f32
         });
-        let potential = ImagePotential::new(grid, samples.collect(), Interpolation::Spline);
+        let potential = ScalarField::new(grid, samples.collect(), Interpolation::Spline);
         Self {
             potential: potential.unwrap(),
             weight: ImageWeight::constant(0.45).unwrap(),

@@ -28,9 +28,9 @@ mod tests;
 mod valley;
 
 use super::{Align, ImproveError, ImproveOptions, ImproveReport, Improver};
+use crate::fields::Fields;
 use crate::geometry::{Bounds, Point};
 use crate::mesh::Mesh;
-use crate::optimize::Fields;
 use crate::watch::{Phase, Watch, check};
 use align::Aligner;
 use heal::{Effort, heal};

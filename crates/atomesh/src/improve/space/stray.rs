@@ -13,7 +13,7 @@ use super::heal::{Effort, heal};
 use super::patch::{NONE, Patch};
 use super::smooth::{facing, worst_cosine};
 use super::valley::Contrast;
-use crate::distance::NominalDistance;
+use crate::fields::NominalDistance;
 use crate::geometry::{Point, distance_squared};
 
 /// A valley that is worth the effort is as deep as this.

@@ -1,10 +1,10 @@
 //! Promises of improved meshes, and swaps against all that there are.
 
 use super::*;
-use crate::distance::NominalDistance;
+use crate::fields::NominalDistance;
+use crate::fields::{ImageWeight, Interpolation, ScalarField};
 use crate::image::Grid;
 use crate::mesh::Delaunay;
-use crate::potential::{ImagePotential, ImageWeight, Interpolation};
 use crate::watch::Silent;
 use patch::Patch;
 use proptest::prelude::*;
@@ -19,11 +19,11 @@ fn sheet(p: &Point<3>) -> f64 {
     -(-0.5 * (height / 1.2).powi(2)).exp()
 }
 
-fn potential(b: impl Fn(&Point<3>) -> f64) -> ImagePotential<3> {
+fn potential(b: impl Fn(&Point<3>) -> f64) -> ScalarField<3> {
     let grid = Grid { shape: [13; 3], step: [1.0; 3] };
     let at = |i: usize| [i % 13, i / 13 % 13, i / 169].map(|k| k as f64);
     let samples = (0..grid.sample_count()).map(|i| b(&at(i)) as f32).collect();
-    ImagePotential::new(grid, samples, Interpolation::Linear).unwrap()
+    ScalarField::new(grid, samples, Interpolation::Linear).unwrap()
 }
 
 /// A Delaunay mesh of the box's corners and of points within it, some of them drawn to its sides.
@@ -40,7 +40,7 @@ fn mesh(inside: &[Point<3>]) -> Mesh<3> {
 
 fn improve(
     mesh: Mesh<3>,
-    potential: &ImagePotential<3>,
+    potential: &ScalarField<3>,
     beta: f64,
     options: &ImproveOptions,
 ) -> Result<(Mesh<3>, ImproveReport), ImproveError> {

@@ -1,7 +1,7 @@
 //! The image along facets: the mean of b over a facet, and how far from it the valley's bottom is.
 
+use crate::fields::ScalarField;
 use crate::geometry::{Point, cross, difference, dot};
-use crate::potential::ImagePotential;
 
 /// b between samples, linear along each axis whatever the atoms felt: only its value is wanted, often.
 pub(super) struct Valley<'a> {
@@ -29,7 +29,7 @@ fn between(p: &[Point<3>; 3], w: &[f64; 3]) -> Point<3> {
 }
 
 impl<'a> Valley<'a> {
-    pub fn new(potential: &'a ImagePotential<3>) -> Self {
+    pub fn new(potential: &'a ScalarField<3>) -> Self {
         let grid = potential.grid();
         let shape = grid.shape;
         let strides = [1, shape[0], shape[0] * shape[1]];

@@ -1,7 +1,7 @@
 //! The inner loop of the pairs engine.
 
+use crate::energy::pair;
 use crate::geometry::Point;
-use crate::pair;
 
 use super::lanes::{Lanes, WIDTH};
 use super::neighbors::List;

@@ -7,7 +7,7 @@
 //!
 //! ```
 //! use atomesh::image::{Frame, Image, Samples};
-//! use atomesh::pipeline::{Inputs, MeshOptions, Method, Size, prepare};
+//! use atomesh::run::{Inputs, MeshOptions, Method, Size, prepare};
 //! use atomesh::watch::Silent;
 //!
 //! let mut grey = vec![200u8; 64 * 48];
@@ -29,14 +29,16 @@ mod outcome;
 #[cfg(test)]
 mod tests;
 
-pub use error::{PipelineError, Warning};
+pub use error::{RunError, Warning};
 pub use estimate::Estimate;
 pub use method::Method;
 pub use options::{LatticeKind, MeshKind, MeshOptions, POINTS_PER_WAVELENGTH, Size};
 pub use outcome::{MeshReport, Outcome, VoronoiReport, sides};
 
-use crate::distance::{GRADIENT_LIMIT, Grading, NominalDistance, default_distance};
 use crate::enhance::{self, FeatureOptions, Features};
+use crate::fields::Fields;
+use crate::fields::{GRADIENT_LIMIT, Grading, NominalDistance, default_distance};
+use crate::fields::{ImageWeight, Interpolation, ScalarField};
 use crate::geometry::{Point, compact_order};
 use crate::image::{Frame, Grid, Image, Samples, Units};
 use crate::improve::{Align, ImproveReport};
@@ -45,8 +47,7 @@ use crate::lattice::{
 };
 use crate::mesh::{Mesh, merge_duplicates};
 use crate::mirror::{MirrorReport, Mirrored, crests, mirror};
-use crate::optimize::{EngineKind, Fields, OptimizeReport, optimize};
-use crate::potential::{ImagePotential, ImageWeight, Interpolation};
+use crate::optimize::{EngineKind, OptimizeReport, optimize};
 use crate::region::{
     Outline, RegionError, Trimmed, fit, islands, label_samples, outline_facets, smooth, trim,
 };
@@ -92,7 +93,7 @@ pub struct Prepared<'m, const D: usize> {
     options: MeshOptions<D>,
     frame: Frame<D>,
     grid: Grid<D>,
-    potential: ImagePotential<D>,
+    potential: ScalarField<D>,
     weight: ImageWeight<D>,
     distance: NominalDistance<D>,
     /// Where the mesh ends, if it does not fill the box.
@@ -104,20 +105,20 @@ pub struct Prepared<'m, const D: usize> {
 /// Makes b(x), d(x) and β(x).
 ///
 /// # Errors
-/// [`PipelineError`] if an option is out of range, a field has another shape or bad values, the samples
+/// [`RunError`] if an option is out of range, a field has another shape or bad values, the samples
 /// are not finite, or the work was cancelled.
 pub fn prepare<'m, const D: usize>(
     method: &'m Method<D>,
     inputs: Inputs<'_, D>,
     options: MeshOptions<D>,
     watch: &mut dyn Watch,
-) -> Result<Prepared<'m, D>, PipelineError> {
+) -> Result<Prepared<'m, D>, RunError> {
     let frame = *inputs.image.frame();
     let grid = frame.grid(options.units);
     options.optimize.validate()?;
     options.improve.validate(D)?;
     if let Some(axis) = (0..D).find(|&k| grid.shape[k] < 2) {
-        return Err(PipelineError::Thin { axis });
+        return Err(RunError::Thin { axis });
     }
     method.crystal(options.lattice)?; // refuse early what does not fit the dimension
     let mut warnings = Vec::new();
@@ -154,7 +155,7 @@ pub fn prepare<'m, const D: usize>(
         warnings.push(Warning::Coarse { axis, distance, extent });
     }
     check(watch, Phase::Distance, 1.0, None)?;
-    let potential = ImagePotential::new(grid, samples, options.interpolation)?;
+    let potential = ScalarField::new(grid, samples, options.interpolation)?;
     Ok(Prepared {
         method,
         options,
@@ -175,7 +176,7 @@ fn potential_samples<const D: usize>(
     options: &MeshOptions<D>,
     warnings: &mut Vec<Warning>,
     watch: &mut dyn Watch,
-) -> Result<Vec<f32>, PipelineError> {
+) -> Result<Vec<f32>, RunError> {
     if inputs.is_potential {
         return Ok(enhance::given_potential(inputs.image.samples().clone())?);
     }
@@ -220,7 +221,7 @@ fn nominal_distance<const D: usize>(
     grid: &Grid<D>,
     options: &MeshOptions<D>,
     samples: &[f32],
-) -> Result<NominalDistance<D>, PipelineError> {
+) -> Result<NominalDistance<D>, RunError> {
     if let Some(field) = inputs.size_field {
         same_shape("size field", inputs.image.frame(), field)?;
         let values = field.samples().to_f32();
@@ -246,9 +247,9 @@ fn same_shape<const D: usize>(
     name: &'static str,
     frame: &Frame<D>,
     field: &Image<D>,
-) -> Result<(), PipelineError> {
+) -> Result<(), RunError> {
     let (expected, found) = (frame.shape().to_vec(), field.frame().shape().to_vec());
-    if expected == found { Ok(()) } else { Err(PipelineError::Shape { name, expected, found }) }
+    if expected == found { Ok(()) } else { Err(RunError::Shape { name, expected, found }) }
 }
 
 impl<const D: usize> Prepared<'_, D> {
@@ -258,7 +259,7 @@ impl<const D: usize> Prepared<'_, D> {
     }
 
     /// b(x).
-    pub fn potential(&self) -> &ImagePotential<D> {
+    pub fn potential(&self) -> &ScalarField<D> {
         &self.potential
     }
 
@@ -290,8 +291,8 @@ impl<const D: usize> Prepared<'_, D> {
     /// Fills the box with atoms.
     ///
     /// # Errors
-    /// [`PipelineError::Lattice`].
-    pub fn grow(&self, watch: &mut dyn Watch) -> Result<Lattice<D>, PipelineError> {
+    /// [`RunError::Lattice`].
+    pub fn grow(&self, watch: &mut dyn Watch) -> Result<Lattice<D>, RunError> {
         let bounds = self.grid.bounds();
         let units = self.options.units;
         let seeds: Vec<Point<D>> = (self.options.seed_points.iter())
@@ -319,11 +320,7 @@ impl<const D: usize> Prepared<'_, D> {
     }
 
     /// Fills and settles a crystal that has grown where d varies.
-    fn even_out(
-        &self,
-        lattice: Lattice<D>,
-        watch: &mut dyn Watch,
-    ) -> Result<Lattice<D>, PipelineError> {
+    fn even_out(&self, lattice: Lattice<D>, watch: &mut dyn Watch) -> Result<Lattice<D>, RunError> {
         let is_even = self.distance.is_constant() || self.outline.is_some();
         let (Some(evening), false) = (self.method.evening(), is_even) else {
             return Ok(lattice);
@@ -351,7 +348,7 @@ impl<const D: usize> Prepared<'_, D> {
         mesh: Mesh<D>,
         freedom: &[u8],
         watch: &mut dyn Watch,
-    ) -> Result<(Mesh<D>, Option<ImproveReport>), PipelineError> {
+    ) -> Result<(Mesh<D>, Option<ImproveReport>), RunError> {
         let (Some(improver), false) =
             (self.method.improver(), self.options.improve.align == Align::Off || self.is_voronoi())
         else {
@@ -371,7 +368,7 @@ impl<const D: usize> Prepared<'_, D> {
         &self,
         mesh: &Mesh<D>,
         watch: &mut dyn Watch,
-    ) -> Result<Option<PolyMesh<D>>, PipelineError> {
+    ) -> Result<Option<PolyMesh<D>>, RunError> {
         if !self.is_voronoi() {
             return Ok(None);
         }
@@ -385,7 +382,7 @@ impl<const D: usize> Prepared<'_, D> {
         &self,
         lattice: Lattice<D>,
         watch: &mut dyn Watch,
-    ) -> Result<(Mesh<D>, Vec<u8>), PipelineError> {
+    ) -> Result<(Mesh<D>, Vec<u8>), RunError> {
         // where the image alone counts, atoms may fall into the same corner
         let (points, merged) = merge_duplicates(lattice.atoms());
         let freedom = lattice.freedom_of(&merged, points.len());
@@ -400,7 +397,7 @@ impl<const D: usize> Prepared<'_, D> {
         lattice: Lattice<D>,
         outline: &Outline<D>,
         watch: &mut dyn Watch,
-    ) -> Result<Trimmed<D>, PipelineError> {
+    ) -> Result<Trimmed<D>, RunError> {
         let outlined = Outlined::new(lattice, outline, &self.distance);
         if outlined.lattice().len() <= D {
             return Err(RegionError::SmallMask { distance: self.distance.least() }.into());
@@ -423,7 +420,7 @@ impl<const D: usize> Prepared<'_, D> {
         mesh: &Mesh<D>,
         samples: &[i32],
         watch: &mut dyn Watch,
-    ) -> Result<Vec<i32>, PipelineError> {
+    ) -> Result<Vec<i32>, RunError> {
         let frame = Frame::new(self.grid.shape).and_then(|f| f.with_spacing(self.grid.step));
         let frame = frame.expect("a grid has samples and steps above 0");
         let samples = Samples::I32(samples.to_vec());
@@ -449,7 +446,7 @@ impl<const D: usize> Prepared<'_, D> {
         &self,
         lattice: Lattice<D>,
         watch: &mut dyn Watch,
-    ) -> Result<(Lattice<D>, OptimizeReport, Option<MirrorReport>), PipelineError> {
+    ) -> Result<(Lattice<D>, OptimizeReport, Option<MirrorReport>), RunError> {
         let options = &self.options.optimize;
         let crests = if self.is_mirrored() { crests(self.fields(), watch)? } else { Vec::new() };
         if !crests.is_empty() {
@@ -468,14 +465,14 @@ impl<const D: usize> Prepared<'_, D> {
     /// Grows the lattice, moves the atoms, connects them, and improves the mesh.
     ///
     /// # Errors
-    /// [`PipelineError`] if memory does not suffice, the energy is not finite, or the work was cancelled.
-    pub fn run(self, watch: &mut dyn Watch) -> Result<Outcome<D>, PipelineError> {
+    /// [`RunError`] if memory does not suffice, the energy is not finite, or the work was cancelled.
+    pub fn run(self, watch: &mut dyn Watch) -> Result<Outcome<D>, RunError> {
         let estimate = self.estimate();
         if let Some(available) = self.options.memory_limit
             && estimate.memory > available
         {
             let least = self.distance.least();
-            return Err(PipelineError::Memory { needed: estimate.memory, available, least });
+            return Err(RunError::Memory { needed: estimate.memory, available, least });
         }
         let (lattice, report, mirror_report) = self.settled(self.grow(watch)?, watch)?;
         let (mesh, freedom) = match &self.outline {

@@ -4,7 +4,7 @@ use crate::improve::{Improver, PlaneImprover, Space};
 use crate::lattice::{Crystal, Scatterer};
 use crate::mesh::Delaunay;
 
-use super::error::PipelineError;
+use super::error::RunError;
 use super::estimate::Filling;
 use super::options::LatticeKind;
 
@@ -65,13 +65,13 @@ impl Method<3> {
 
 impl<const D: usize> Method<D> {
     /// The crystal of that name; `None` for a random lattice.
-    pub(super) fn crystal(&self, kind: LatticeKind) -> Result<Option<&Crystal<D>>, PipelineError> {
+    pub(super) fn crystal(&self, kind: LatticeKind) -> Result<Option<&Crystal<D>>, RunError> {
         match kind {
             LatticeKind::Random => Ok(None),
             LatticeKind::Default => Ok(Some(&self.crystals[0].1)),
             _ => match self.crystals.iter().find(|(name, _)| *name == kind) {
                 Some((_, crystal)) => Ok(Some(crystal)),
-                None => Err(PipelineError::LatticeDimension { kind, dimension: D }),
+                None => Err(RunError::LatticeDimension { kind, dimension: D }),
             },
         }
     }

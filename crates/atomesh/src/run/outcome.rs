@@ -1,7 +1,8 @@
 //! What a run gives.
 
-use crate::distance::{NominalDistance, feature_density};
 use crate::features::{FacetField, FeatureFacetOptions, FeatureSet, find_features};
+use crate::fields::ScalarField;
+use crate::fields::{NominalDistance, feature_density};
 use crate::geometry::{Bounds, Point};
 use crate::image::{Frame, Grid, Samples, Units};
 use crate::improve::ImproveReport;
@@ -13,13 +14,12 @@ use crate::measure::{
 use crate::mesh::{FacetGroup, Mesh, Quadratic, Regions, Tags, TagsError};
 use crate::mirror::MirrorReport;
 use crate::optimize::OptimizeReport;
-use crate::potential::ImagePotential;
 use crate::region::{Outline, interfaces};
 use crate::voronoi::{FeatureFaces, PolyMesh, PolyReport, feature_faces};
 use crate::watch::Watch;
 use rayon::prelude::*;
 
-use super::error::{PipelineError, Warning};
+use super::error::{RunError, Warning};
 
 /// A mesh, the fields it follows, and how it came about.
 #[derive(Clone, Debug)]
@@ -28,7 +28,7 @@ pub struct Outcome<const D: usize> {
     pub(super) cells: Option<PolyMesh<D>>,
     pub(super) distance_at_points: Vec<f32>,
     pub(super) potential_at_points: Vec<f32>,
-    pub(super) potential: ImagePotential<D>,
+    pub(super) potential: ScalarField<D>,
     pub(super) distance: NominalDistance<D>,
     pub(super) frame: Frame<D>,
     pub(super) units: Units,
@@ -90,13 +90,13 @@ impl<const D: usize> Outcome<D> {
     /// The facets that follow features, in world coordinates; `world` is [`Outcome::world_mesh`].
     ///
     /// # Errors
-    /// [`PipelineError::Features`], also when cancelled.
+    /// [`RunError::Features`], also when cancelled.
     pub fn features(
         &self,
         world: &Mesh<D>,
         options: &FeatureFacetOptions,
         watch: &mut dyn Watch,
-    ) -> Result<FeatureSet<D>, PipelineError> {
+    ) -> Result<FeatureSet<D>, RunError> {
         let field = FacetField::along(&self.mesh, &self.potential, watch)?;
         Ok(find_features(world, &field, options)?)
     }
@@ -136,11 +136,8 @@ impl<const D: usize> Outcome<D> {
     /// Measures the Voronoi cells, if they were asked for.
     ///
     /// # Errors
-    /// [`PipelineError::Measure`], also when cancelled.
-    pub fn cells_report(
-        &self,
-        watch: &mut dyn Watch,
-    ) -> Result<Option<VoronoiReport>, PipelineError> {
+    /// [`RunError::Measure`], also when cancelled.
+    pub fn cells_report(&self, watch: &mut dyn Watch) -> Result<Option<VoronoiReport>, RunError> {
         let (Some(cells), Some(in_samples)) = (&self.cells, self.sample_cells()) else {
             return Ok(None);
         };
@@ -164,7 +161,7 @@ impl<const D: usize> Outcome<D> {
     }
 
     /// b(x).
-    pub fn potential(&self) -> &ImagePotential<D> {
+    pub fn potential(&self) -> &ScalarField<D> {
         &self.potential
     }
 
@@ -299,28 +296,28 @@ impl<const D: usize> Outcome<D> {
     /// Measures shape and alignment.
     ///
     /// # Errors
-    /// [`PipelineError::Measure`], also when cancelled.
-    pub fn report(&self, watch: &mut dyn Watch) -> Result<MeshReport, PipelineError> {
+    /// [`RunError::Measure`], also when cancelled.
+    pub fn report(&self, watch: &mut dyn Watch) -> Result<MeshReport, RunError> {
         let size =
             WantedSize { mean: self.distance.mean(), at_points: Some(&self.distance_at_points) };
         let (grid, samples) = (self.potential.grid(), self.potential.samples());
         MeshReport::within(&self.mesh, self.bounds(), (grid, samples), size, watch)
-            .map_err(PipelineError::Measure)
+            .map_err(RunError::Measure)
     }
 
     /// Measures how well the mesh carries an image on the grid of the potential.
     ///
     /// # Errors
-    /// [`PipelineError::Measure`], also when cancelled.
+    /// [`RunError::Measure`], also when cancelled.
     pub fn fidelity(
         &self,
         samples: &Samples,
         watch: &mut dyn Watch,
-    ) -> Result<FidelityReport, PipelineError> {
+    ) -> Result<FidelityReport, RunError> {
         let grid = self.potential.grid();
         let frame = Frame::new(grid.shape).and_then(|frame| frame.with_spacing(grid.step));
         let frame = frame.expect("a grid's shape and step were a frame's");
-        fidelity(&self.mesh, (&frame, samples), watch).map_err(PipelineError::Measure)
+        fidelity(&self.mesh, (&frame, samples), watch).map_err(RunError::Measure)
     }
 }
 

@@ -1,15 +1,15 @@
 //! What can go wrong, and what is odd enough to say.
 
-use crate::distance::DistanceError;
 use crate::enhance::EnhanceError;
 use crate::features::FeaturesError;
+use crate::fields::DistanceError;
+use crate::fields::FieldError;
 use crate::improve::ImproveError;
 use crate::lattice::LatticeError;
 use crate::measure::MeasureError;
 use crate::mesh::ConnectError;
 use crate::mirror::MirrorError;
 use crate::optimize::OptimizeError;
-use crate::potential::PotentialError;
 use crate::region::RegionError;
 use crate::sample::SampleError;
 use crate::voronoi::VoronoiError;
@@ -20,7 +20,7 @@ use super::options::LatticeKind;
 /// Why there is no mesh.
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]
 #[non_exhaustive]
-pub enum PipelineError {
+pub enum RunError {
     /// The image has one sample along an axis.
     #[error("the image has 1 sample along {}; a mesh needs 2 or more along every axis", ["x", "y", "z"][*axis])]
     Thin {
@@ -64,7 +64,7 @@ pub enum PipelineError {
     Enhance(#[from] EnhanceError),
     /// The potential or the weight is out of range.
     #[error(transparent)]
-    Potential(#[from] PotentialError),
+    Potential(#[from] FieldError),
     /// The nominal distance is out of range.
     #[error(transparent)]
     Distance(#[from] DistanceError),
@@ -100,7 +100,7 @@ pub enum PipelineError {
     Cancelled(#[from] Cancelled),
 }
 
-impl PipelineError {
+impl RunError {
     /// Whether the caller ended the work, in whichever phase.
     pub fn is_cancelled(&self) -> bool {
         matches!(
@@ -122,7 +122,7 @@ impl PipelineError {
 
 macro_rules! from {
     ($($error:ident => $variant:ident),*) => {
-        $(impl From<$error> for PipelineError {
+        $(impl From<$error> for RunError {
             fn from(error: $error) -> Self {
                 Self::$variant(error)
             }
@@ -131,7 +131,7 @@ macro_rules! from {
 }
 from!(LatticeError => Lattice, OptimizeError => Optimize, ConnectError => Connect, RegionError => Region, SampleError => Sample, ImproveError => Improve, FeaturesError => Features, VoronoiError => Voronoi, MeasureError => Measure);
 
-impl From<MirrorError> for PipelineError {
+impl From<MirrorError> for RunError {
     fn from(error: MirrorError) -> Self {
         match error {
             MirrorError::Lattice(error) => Self::Lattice(error),

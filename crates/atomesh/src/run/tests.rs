@@ -4,7 +4,7 @@ use rand::{RngExt, SeedableRng};
 use rand_pcg::Pcg64;
 
 use super::*;
-use crate::distance::{DistanceError, GradeBy};
+use crate::fields::{DistanceError, GradeBy};
 use crate::geometry::difference;
 use crate::image::Samples;
 use crate::lattice::LatticeError;
@@ -43,7 +43,7 @@ fn run<const D: usize>(
     method: &Method<D>,
     image: &Image<D>,
     options: MeshOptions<D>,
-) -> Result<Outcome<D>, PipelineError> {
+) -> Result<Outcome<D>, RunError> {
     prepare(method, Inputs::image(image), options, &mut Silent)?.run(&mut Silent)
 }
 
@@ -205,14 +205,14 @@ fn meshes_or_refusals<const D: usize>(
                 meshes += 1;
             }
             // every refusal names what was asked for and could not be
-            Err(PipelineError::LatticeDimension { .. }) => {
+            Err(RunError::LatticeDimension { .. }) => {
                 assert_eq!((D, kind), (2, LatticeKind::Bcc))
             }
-            Err(PipelineError::Potential(_)) => assert_eq!(weight, 1.1),
-            Err(PipelineError::Distance(DistanceError::BelowStep { value, .. })) => {
+            Err(RunError::Potential(_)) => assert_eq!(weight, 1.1),
+            Err(RunError::Distance(DistanceError::BelowStep { value, .. })) => {
                 assert!(value < step, "{what}");
             }
-            Err(PipelineError::Distance(DistanceError::Order { .. })) => {
+            Err(RunError::Distance(DistanceError::Order { .. })) => {
                 assert!(matches!(chosen, Size::Range { min, max } if min > max), "{what}");
             }
             Err(error) => panic!("{what}: {error}"),
@@ -331,7 +331,7 @@ fn what_cannot_be_meshed_is_refused_by_name() {
     assert!(error.to_string().contains("potential"), "{error}");
     let line = image(Frame::new([9, 8, 1]).unwrap(), |_| 0.0);
     let error = run(&Method::volume(), &line, sized(4.0)).unwrap_err();
-    assert_eq!(error, PipelineError::Thin { axis: 2 });
+    assert_eq!(error, RunError::Thin { axis: 2 });
 }
 
 #[test]
@@ -339,7 +339,7 @@ fn a_memory_limit_refuses_with_advice() {
     let flat = sheet(Frame::new([60, 60]).unwrap());
     let options = MeshOptions { memory_limit: Some(1 << 20), ..sized(4.0) };
     let error = run(&Method::flat(), &flat, options).unwrap_err();
-    assert!(matches!(error, PipelineError::Memory { available: 1_048_576, .. }));
+    assert!(matches!(error, RunError::Memory { available: 1_048_576, .. }));
     let text = error.to_string();
     assert!(text.contains("1 MiB available") && text.contains("distance above 4"), "{text}");
     let options = MeshOptions { memory_limit: Some(1 << 30), ..sized(4.0) };
@@ -513,7 +513,7 @@ fn lengths_of_any_magnitude_are_meshed_and_absurd_ones_refused() {
                 assert!((1e-30..=1e30).contains(&scale), "{scale:e} meshed");
             }
             Err(error) => {
-                let absurd = matches!(error, PipelineError::Lattice(LatticeError::Scale { .. }));
+                let absurd = matches!(error, RunError::Lattice(LatticeError::Scale { .. }));
                 assert!(absurd && !(1e-30..=1e30).contains(&scale), "{scale:e}: {error}");
             }
         }

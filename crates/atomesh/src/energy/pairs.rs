@@ -11,12 +11,13 @@
 
 use rayon::prelude::*;
 
-use crate::distance::NominalDistance;
+use crate::energy::pair;
+use crate::fields::NominalDistance;
 use crate::geometry::{Bounds, Point, compact_order, distance_squared};
-use crate::pair;
 
-use super::engine::{Energy, Engine, ImageWeight};
-use super::image::{HeldCell, ImagePotential};
+use crate::fields::{HeldCell, ImageWeight, ScalarField};
+
+use super::engine::{Energy, Engine};
 use super::kernel::{Graded, Scale, Uniform, add_pairs};
 use super::lanes::{LANES, Lanes, Plain};
 use super::neighbors::{CHUNK, Chunk, NeighborLists};
@@ -38,7 +39,7 @@ const AHEAD: usize = 8;
 /// Departure from the paper: a pair's nominal distance is the mean of its atoms', d_ij = (dᵢ + dⱼ)/2,
 /// which is symmetric and equals the paper's d(xⱼ) to first order since |∇d| ≪ 1.
 pub struct PairsEngine<'a, const D: usize> {
-    potential: &'a ImagePotential<D>,
+    potential: &'a ScalarField<D>,
     weight: &'a ImageWeight<D>,
     distance: &'a NominalDistance<D>,
     tree: Tree<D>,
@@ -66,7 +67,7 @@ pub struct PairsEngine<'a, const D: usize> {
 impl<'a, const D: usize> PairsEngine<'a, D> {
     /// An engine for atoms in these fields.
     pub fn new(
-        potential: &'a ImagePotential<D>,
+        potential: &'a ScalarField<D>,
         weight: &'a ImageWeight<D>,
         distance: &'a NominalDistance<D>,
     ) -> Self {
@@ -344,8 +345,8 @@ mod tests {
     use rand_pcg::Pcg64;
 
     use super::*;
+    use crate::fields::Interpolation;
     use crate::image::Grid;
-    use crate::potential::Interpolation;
 
     /// Calls `check` with an engine prepared for some 3000 atoms, in a compact order or in any, in fields
     /// that vary or do not.
@@ -355,7 +356,7 @@ mod tests {
         let grid = Grid { shape: [40; D], step: [1.0; D] };
         let wave = |i: usize| (0.37 * i as f32).sin();
         let b = (0..grid.sample_count()).map(wave).collect();
-        let potential = ImagePotential::new(grid, b, Interpolation::Linear).unwrap();
+        let potential = ScalarField::new(grid, b, Interpolation::Linear).unwrap();
         let half = (0..grid.sample_count()).map(|i| 0.5 + 0.5 * wave(i)).collect();
         let weights =
             [ImageWeight::constant(0.4).unwrap(), ImageWeight::field(grid, half).unwrap()];

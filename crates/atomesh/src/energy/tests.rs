@@ -3,15 +3,17 @@
 use rand::{RngExt, SeedableRng};
 use rand_pcg::Pcg64;
 
+use crate::fields::{ImageWeight, Interpolation, ScalarField};
+
 use super::*;
-use crate::distance::NominalDistance;
+use crate::energy::pair;
+use crate::fields::NominalDistance;
 use crate::geometry::Point;
 use crate::image::Grid;
-use crate::pair;
 
 /// The fields of a test, and atoms in them.
 struct Scene<const D: usize> {
-    potential: ImagePotential<D>,
+    potential: ScalarField<D>,
     weight: ImageWeight<D>,
     distance: NominalDistance<D>,
     atoms: Vec<Point<D>>,
@@ -48,8 +50,7 @@ impl<const D: usize> Scene<D> {
     fn new(weight: Weight, varying: bool, seed: u64) -> Self {
         let step: [f64; D] = std::array::from_fn(|k| [1.0, 0.8, 1.25][k]);
         let grid = Grid { shape: std::array::from_fn(|k| (20.0 / step[k]) as usize + 1), step };
-        let potential =
-            ImagePotential::new(grid, sample(&grid, wave), Interpolation::Spline).unwrap();
+        let potential = ScalarField::new(grid, sample(&grid, wave), Interpolation::Spline).unwrap();
         let weight = match weight {
             Weight::Constant(weight) => ImageWeight::constant(weight).unwrap(),
             Weight::Field => {
@@ -334,7 +335,7 @@ fn the_sampled_field_is_equation_5_also_at_the_boundary_and_with_unequal_steps()
 fn sampling_errors(d: f64) -> (f64, f64) {
     let grid = Grid { shape: [(12.0 * d) as usize + 1; 2], step: [1.0; 2] };
     let potential =
-        ImagePotential::new(grid, vec![0.0; grid.sample_count()], Interpolation::Linear).unwrap();
+        ScalarField::new(grid, vec![0.0; grid.sample_count()], Interpolation::Linear).unwrap();
     let weight = ImageWeight::constant(0.0).unwrap();
     let distance = NominalDistance::constant(&grid, d).unwrap();
     let (mut energy_squared, mut gradient_squared, mut variables) = (0.0, 0.0, 0.0);

@@ -7,18 +7,16 @@
 //! i = j, a constant n·153/512 that moves no atom.
 
 mod engine;
-mod image;
 mod kernel;
 mod lanes;
 mod neighbors;
+pub mod pair;
 mod pairs;
 mod sampled;
-mod spline;
 mod tree;
 #[cfg(test)]
 mod tests;
 
-pub use engine::{Energy, Engine, ImageWeight, direct_energy};
-pub use image::{ImagePotential, Interpolation, PotentialError};
+pub use engine::{Energy, Engine, direct_energy};
 pub use pairs::PairsEngine;
 pub use sampled::SampledEngine;

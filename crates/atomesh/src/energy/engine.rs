@@ -1,10 +1,9 @@
 //! What every engine promises, and the double sum that they are checked against.
 
+use crate::fields::ScalarField;
 use crate::geometry::{Point, difference, dot};
-use crate::image::Grid;
-use crate::pair;
 
-use super::image::{ImagePotential, Interpolation, PotentialError};
+use super::pair;
 
 /// The two parts of the total potential energy P, without unit, as they enter it.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
@@ -39,51 +38,6 @@ pub trait Engine<const D: usize>: Sync {
     fn distances(&self) -> &[f64];
 }
 
-/// The weight β(x) of the image against regularity, in 0…1.
-///
-/// Source: Hale (2001), equations (4) and (5).
-#[derive(Clone, Debug)]
-pub struct ImageWeight<const D: usize> {
-    constant: f64,
-    field: Option<ImagePotential<D>>,
-}
-
-impl<const D: usize> ImageWeight<D> {
-    /// The same weight everywhere.
-    ///
-    /// # Errors
-    /// [`PotentialError::Weight`] if it is outside 0…1, or NaN.
-    pub fn constant(weight: f64) -> Result<Self, PotentialError> {
-        if !(0.0..=1.0).contains(&weight) {
-            return Err(PotentialError::Weight { index: None, value: weight });
-        }
-        Ok(Self { constant: weight, field: None })
-    }
-
-    /// A weight for every sample of the grid, x fastest, linear in between.
-    ///
-    /// # Errors
-    /// [`PotentialError::Weight`] if a sample is outside 0…1, or NaN; [`PotentialError::SampleCount`]
-    /// if the count is not the grid's.
-    pub fn field(grid: Grid<D>, samples: Vec<f32>) -> Result<Self, PotentialError> {
-        if let Some(i) = samples.iter().position(|w| !(0.0..=1.0).contains(w)) {
-            return Err(PotentialError::Weight { index: Some(i), value: f64::from(samples[i]) });
-        }
-        let field = ImagePotential::new(grid, samples, Interpolation::Linear)?;
-        Ok(Self { constant: 0.0, field: Some(field) })
-    }
-
-    /// β at a lattice point.
-    pub fn at(&self, p: &Point<D>) -> f64 {
-        self.field.as_ref().map_or(self.constant, |field| field.value(p))
-    }
-
-    /// β, where it is the same everywhere.
-    pub fn as_constant(&self) -> Option<f64> {
-        if self.field.is_none() { Some(self.constant) } else { None }
-    }
-}
-
 /// The total potential energy by the double sum of equation (1), and its gradient. O(n²): the reference.
 ///
 /// `distances` and `weights` are d and β at the atoms. A pair's nominal distance is the mean of its
@@ -92,7 +46,7 @@ pub fn direct_energy<const D: usize>(
     atoms: &[Point<D>],
     distances: &[f64],
     weights: &[f64],
-    potential: &ImagePotential<D>,
+    potential: &ScalarField<D>,
     gradient: &mut [Point<D>],
 ) -> Energy {
     let mut energy = Energy::default();

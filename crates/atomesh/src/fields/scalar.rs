@@ -36,7 +36,7 @@ impl Interpolation {
 /// What is wrong with a potential.
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]
 #[non_exhaustive]
-pub enum PotentialError {
+pub enum FieldError {
     /// A sample is outside −1…1, or NaN.
     #[error("sample {index} is {value}; a potential lies in [-1, 1]")]
     OutOfRange {
@@ -68,7 +68,7 @@ pub enum PotentialError {
 ///
 /// Source: Hale (2001), section 2.1.2.
 #[derive(Clone, Debug)]
-pub struct ImagePotential<const D: usize> {
+pub struct ScalarField<const D: usize> {
     grid: Grid<D>,
     samples: Vec<f32>,
     /// 1 / step, and memory strides.
@@ -78,22 +78,22 @@ pub struct ImagePotential<const D: usize> {
     spline: Vec<f32>,
 }
 
-impl<const D: usize> ImagePotential<D> {
+impl<const D: usize> ScalarField<D> {
     /// The potential of these samples (x fastest).
     ///
     /// # Errors
-    /// [`PotentialError`] if a sample is outside −1…1 or the count is not the grid's.
+    /// [`FieldError`] if a sample is outside −1…1 or the count is not the grid's.
     pub fn new(
         grid: Grid<D>,
         samples: Vec<f32>,
         interpolation: Interpolation,
-    ) -> Result<Self, PotentialError> {
+    ) -> Result<Self, FieldError> {
         if samples.len() != grid.sample_count() {
             let (expected, found) = (grid.sample_count(), samples.len());
-            return Err(PotentialError::SampleCount { expected, found });
+            return Err(FieldError::SampleCount { expected, found });
         }
         if let Some(index) = first_outside(&samples) {
-            return Err(PotentialError::OutOfRange { index, value: samples[index] });
+            return Err(FieldError::OutOfRange { index, value: samples[index] });
         }
         let spline = match interpolation {
             Interpolation::Spline => spline::coefficients(&samples, grid.shape),
@@ -155,7 +155,7 @@ impl<const D: usize> ImagePotential<D> {
     /// The same, where the cell of samples that the point was in last time is at hand: read anew only once
     /// the point has left it. The result is that of [`Self::value_and_gradient`].
     #[inline(always)]
-    pub(super) fn value_and_gradient_held(
+    pub(crate) fn value_and_gradient_held(
         &self,
         p: &Point<D>,
         held: &mut HeldCell,
@@ -174,7 +174,7 @@ impl<const D: usize> ImagePotential<D> {
     /// Asks memory for the samples around a lattice point, so that they are at hand when it is read, unless
     /// they are held.
     #[inline(always)]
-    pub(super) fn prefetch(&self, p: &Point<D>, held: &HeldCell) {
+    pub(crate) fn prefetch(&self, p: &Point<D>, held: &HeldCell) {
         #[cfg(target_arch = "x86_64")]
         {
             use std::arch::x86_64::{_MM_HINT_T0, _mm_prefetch};
@@ -282,7 +282,7 @@ impl<const D: usize> ImagePotential<D> {
 
 /// The samples at the corners of the cell of samples that a point was in when it was read last.
 #[derive(Clone, Copy)]
-pub(super) struct HeldCell {
+pub(crate) struct HeldCell {
     /// The cell's first sample; `usize::MAX`: none is held.
     first: usize,
     corners: [f32; 8],
@@ -304,7 +304,7 @@ fn first_outside(samples: &[f32]) -> Option<usize> {
 
 /// Half the difference of the neighbours along an axis, one-sided at the ends; per sample.
 #[inline]
-pub(super) fn centred_difference(
+pub(crate) fn centred_difference(
     samples: &[f32],
     at: usize,
     index: usize,
@@ -329,7 +329,7 @@ mod tests {
         step: [f64; D],
         b: impl Fn(&Point<D>) -> f64,
         interpolation: Interpolation,
-    ) -> ImagePotential<D> {
+    ) -> ScalarField<D> {
         let grid = Grid { shape, step };
         let samples = (0..grid.sample_count())
             .map(|mut i| {
@@ -341,7 +341,7 @@ mod tests {
                 b(&p) as f32
             })
             .collect();
-        ImagePotential::new(grid, samples, interpolation).unwrap()
+        ScalarField::new(grid, samples, interpolation).unwrap()
     }
 
     /// A value and gradient that agree with a plane, wherever they are read.
@@ -440,10 +440,10 @@ mod tests {
     #[test]
     fn values_outside_the_range_are_refused_with_their_place() {
         let grid = Grid { shape: [2, 2], step: [1.0; 2] };
-        let error = ImagePotential::new(grid, vec![0.0, -1.5, 0.0, 0.0], Interpolation::Linear);
+        let error = ScalarField::new(grid, vec![0.0, -1.5, 0.0, 0.0], Interpolation::Linear);
         assert_eq!(error.unwrap_err().to_string(), "sample 1 is -1.5; a potential lies in [-1, 1]");
-        let error = ImagePotential::new(grid, vec![0.0, 0.0, f32::NAN, 0.0], Interpolation::Linear);
+        let error = ScalarField::new(grid, vec![0.0, 0.0, f32::NAN, 0.0], Interpolation::Linear);
         assert!(error.unwrap_err().to_string().starts_with("sample 2 is NaN"));
-        assert!(ImagePotential::new(grid, vec![0.0; 3], Interpolation::Linear).is_err());
+        assert!(ScalarField::new(grid, vec![0.0; 3], Interpolation::Linear).is_err());
     }
 }

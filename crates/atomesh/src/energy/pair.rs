@@ -19,8 +19,8 @@ pub const SELF_ENERGY: f64 = 153.0 / 256.0;
 /// Source: Hale (2001), section 2.1.1. Its least value, at u = 1, is −37/768.
 ///
 /// ```
-/// assert!((atomesh::pair::energy(1.0) + 37.0 / 768.0).abs() < 1e-15);
-/// assert_eq!(atomesh::pair::energy(1.5), 0.0);
+/// assert!((atomesh::energy::pair::energy(1.0) + 37.0 / 768.0).abs() < 1e-15);
+/// assert_eq!(atomesh::energy::pair::energy(1.5), 0.0);
 /// ```
 #[inline]
 pub fn energy(u: f64) -> f64 {

@@ -1,6 +1,6 @@
 //! What a run will take, before it starts.
 
-use crate::distance::NominalDistance;
+use crate::fields::NominalDistance;
 use crate::image::Grid;
 
 /// What a run is expected to take.

@@ -10,7 +10,7 @@ use crate::image::Grid;
 ///
 /// ```
 /// let grid = atomesh::image::Grid { shape: [256, 256], step: [1.0, 1.0] };
-/// assert_eq!(atomesh::distance::default_distance(&grid), 8.0);
+/// assert_eq!(atomesh::fields::default_distance(&grid), 8.0);
 /// ```
 pub fn default_distance<const D: usize>(grid: &Grid<D>) -> f64 {
     let per_atom = if D <= 2 { 2.0 / 3f64.sqrt() / 1_500.0 } else { 0.75 * 3f64.sqrt() / 50_000.0 };

@@ -14,13 +14,14 @@ use std::ops::Range;
 
 use rayon::prelude::*;
 
-use crate::distance::NominalDistance;
+use crate::energy::pair;
+use crate::fields::NominalDistance;
 use crate::geometry::Point;
 use crate::image::Grid;
-use crate::pair;
 
-use super::engine::{Energy, Engine, ImageWeight};
-use super::image::{ImagePotential, centred_difference};
+use crate::fields::{ImageWeight, ScalarField, centred_difference};
+
+use super::engine::{Energy, Engine};
 
 /// Nominal distances of neighbouring tables differ by this ratio.
 const TABLE_RATIO: f64 = 1.02;
@@ -122,7 +123,7 @@ const CHUNK: usize = 2048;
 ///
 /// Source: Hale (2001), algorithm 1. Departure: the atom's own φ(0), which moves nothing, is left out.
 pub struct SampledEngine<'a, const D: usize> {
-    potential: &'a ImagePotential<D>,
+    potential: &'a ScalarField<D>,
     weight: &'a ImageWeight<D>,
     distance: &'a NominalDistance<D>,
     tables: Vec<Table<D>>,
@@ -133,7 +134,7 @@ pub struct SampledEngine<'a, const D: usize> {
 impl<'a, const D: usize> SampledEngine<'a, D> {
     /// An engine for atoms in these fields; tabulates φ for the nominal distances there are.
     pub fn new(
-        potential: &'a ImagePotential<D>,
+        potential: &'a ScalarField<D>,
         weight: &'a ImageWeight<D>,
         distance: &'a NominalDistance<D>,
     ) -> Self {

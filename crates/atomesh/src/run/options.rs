@@ -2,19 +2,19 @@
 
 use serde::{Deserialize, Serialize};
 
-use crate::distance::GradeBy;
 use crate::enhance::{FeatureOptions, Mixture};
+use crate::fields::GradeBy;
+use crate::fields::Interpolation;
 use crate::geometry::Point;
 use crate::image::Units;
 use crate::improve::ImproveOptions;
 use crate::optimize::OptimizeOptions;
-use crate::potential::Interpolation;
 
 /// The nominal distance wanted, in lattice units.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize)]
 #[serde(rename_all = "kebab-case")]
 pub enum Size {
-    /// [`crate::distance::default_distance`] of the image's box.
+    /// [`crate::fields::default_distance`] of the image's box.
     #[default]
     Default,
     /// The same everywhere.
@@ -28,7 +28,7 @@ pub enum Size {
         max: f64,
     },
     /// For waves: the image holds velocities v in lattice units a second, and d = v / (frequency · points), so
-    /// that a wavelength has so many edges; its slope limited as [`crate::distance::NominalDistance::from_field`]
+    /// that a wavelength has so many edges; its slope limited as [`crate::fields::NominalDistance::from_field`]
     /// does.
     Wavelength {
         /// In 1/s.
