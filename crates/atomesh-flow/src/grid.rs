@@ -47,7 +47,7 @@ enum Shape<const D: usize> {
 
 /// What flow needs to know of a mesh: cells, facets, and names of facets.
 #[derive(Clone, Debug)]
-pub struct Grid<const D: usize> {
+pub struct FlowGrid<const D: usize> {
     measures: Vec<f64>,
     centroids: Vec<Point<D>>,
     facets: Vec<FlowFacet<D>>,
@@ -59,7 +59,7 @@ pub struct Grid<const D: usize> {
     shape: Shape<D>,
 }
 
-impl<const D: usize> Grid<D> {
+impl<const D: usize> FlowGrid<D> {
     /// Of triangles or tetrahedra of positive orientation; facets are those of [`Mesh::facets`], in that order.
     /// Names come from `tags`.
     ///
@@ -281,7 +281,11 @@ fn simplices_at<const D: usize>(mesh: &Mesh<D>, place: &Point<D>) -> Vec<u32> {
 
 /// The mean of a value over a cell: exact for quadratic fields in triangles and tetrahedra (the mean of the
 /// corners and the centroid, by weight), the value at the centroid in Voronoi cells.
-pub(crate) fn cell_mean<const D: usize>(grid: &Grid<D>, cell: usize, value: &Value<'_, D>) -> f64 {
+pub(crate) fn cell_mean<const D: usize>(
+    grid: &FlowGrid<D>,
+    cell: usize,
+    value: &Value<'_, D>,
+) -> f64 {
     let centre = &grid.centroids[cell];
     if let (Value::Field(_), Shape::Simplices(mesh)) = (value, &grid.shape) {
         let corners = &mesh.corners()[cell * (D + 1)..(cell + 1) * (D + 1)];
@@ -293,7 +297,7 @@ pub(crate) fn cell_mean<const D: usize>(grid: &Grid<D>, cell: usize, value: &Val
 /// The integral of a value over a facet: exact for quadratic fields on facets of triangles and tetrahedra, by the
 /// centroid on faces of Voronoi cells.
 pub(crate) fn facet_integral<const D: usize>(
-    grid: &Grid<D>,
+    grid: &FlowGrid<D>,
     facet: usize,
     value: &Value<'_, D>,
 ) -> f64 {

@@ -1,7 +1,7 @@
 //! Steady flow of one fluid on a mesh that follows an image: `−∇·(k∇p) = q` (Hale 2001, section 3.1).
 //!
 //! A [`Problem`] says what flows where, by names and places: permeability, wells, pressure or flux on sides,
-//! barriers with multipliers. A [`Grid`] is what is known of a mesh's cells and facets, whether triangles,
+//! barriers with multipliers. A [`FlowGrid`] is what is known of a mesh's cells and facets, whether triangles,
 //! tetrahedra or Voronoi cells. The two make a [`Setting`], in which every facet and well is placed and every
 //! compartment has been found solvable. Then one of two schemes answers with a [`Solution`]:
 //!
@@ -17,12 +17,12 @@
 //! use atomesh::geometry::Bounds;
 //! use atomesh::mesh::{Delaunay, Tags};
 //! use atomesh::watch::Silent;
-//! use atomesh_flow::{Boundary, Condition, Grid, Problem, Setting, Value, dg};
+//! use atomesh_flow::{Boundary, Condition, FlowGrid, Problem, Setting, Value, dg};
 //!
 //! let points: Vec<[f64; 2]> = (0..25).map(|i| [f64::from(i % 5), f64::from(i / 5)]).collect();
 //! let mesh = Delaunay::<2>::new().connect(&points, &mut Silent)?;
 //! let sides = Tags::sides(&mesh, &Bounds { min: [0.0; 2], max: [4.0; 2] }, 1e-9);
-//! let grid = Grid::of_mesh(&mesh, &sides);
+//! let grid = FlowGrid::of_mesh(&mesh, &sides);
 //! let fixed = |group: &str, pressure| Boundary {
 //!     group: group.into(),
 //!     condition: Condition::Pressure(Value::Constant(pressure)),
@@ -40,6 +40,7 @@
 pub mod dg;
 mod error;
 mod grid;
+mod method;
 mod permeability;
 mod problem;
 mod setting;
@@ -51,7 +52,8 @@ pub mod two_point;
 pub(crate) mod test_meshes;
 
 pub use error::FlowError;
-pub use grid::{FacetSet, FlowFacet, Grid};
+pub use grid::{FacetSet, FlowFacet, FlowGrid};
+pub use method::FlowMethod;
 pub use permeability::{Permeability, Tensor};
 pub use problem::{Barrier, Boundary, Condition, Control, Problem, Value, Well};
 pub use setting::{Compartment, PlacedWell, Setting, well_index};

@@ -2,7 +2,7 @@
 
 use atomesh::geometry::{Point, difference};
 
-use crate::grid::Grid;
+use crate::grid::FlowGrid;
 use crate::setting::Setting;
 use crate::solve::SolveReport;
 
@@ -70,7 +70,7 @@ impl<const D: usize> Solution<D> {
     /// The mean Darcy velocity of each cell, from its fluxes: `v = Σ F_f (x_f − x_K) / |K|`, F_f outward: that
     /// of the field of the least order that has these fluxes (Raviart & Thomas 1977 in simplices), exact
     /// where the velocity is constant.
-    pub fn velocities(&self, grid: &Grid<D>) -> Vec<Point<D>> {
+    pub fn velocities(&self, grid: &FlowGrid<D>) -> Vec<Point<D>> {
         let velocity = |cell: usize| {
             let centre = &grid.centroids()[cell];
             let mut velocity = [0.0; D];
@@ -88,7 +88,7 @@ impl<const D: usize> Solution<D> {
     }
 
     /// What flows in and out, from fluxes and sources alone.
-    pub fn balance(&self, grid: &Grid<D>) -> Balance {
+    pub fn balance(&self, grid: &FlowGrid<D>) -> Balance {
         let mut balance = Balance {
             // an empty sum is −0
             wells_in: self.wells.iter().fold(0.0, |sum, well| sum + well.rate.max(0.0)),
@@ -121,7 +121,7 @@ impl<const D: usize> Solution<D> {
     }
 
     /// The most that flows through a sealed facet, as a share of all that flows.
-    pub fn leak(&self, grid: &Grid<D>, setting: &Setting<'_, D>) -> f64 {
+    pub fn leak(&self, grid: &FlowGrid<D>, setting: &Setting<'_, D>) -> f64 {
         let scale = self.balance(grid).scale;
         let sealed = setting.multipliers().iter().zip(&self.fluxes);
         let most =

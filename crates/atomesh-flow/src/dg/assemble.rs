@@ -110,7 +110,8 @@ fn fill<const D: usize>(scheme: &Scheme<'_, D>, cell: usize, beside: &[u32], row
         if let Some(interface) = &scheme.interfaces[facet as usize] {
             let mine = interface.side_of(cell as u32);
             for side in interface.sides() {
-                add_interface(scheme, interface, (mine, side), &mut rows[at(side.cell)..], width);
+                let coupling = Coupling { interface, mine, other: side };
+                add_coupling(scheme, &coupling, &mut rows[at(side.cell)..], width);
             }
         }
     }
@@ -124,14 +125,21 @@ fn fill<const D: usize>(scheme: &Scheme<'_, D>, cell: usize, beside: &[u32], row
     rows[own] += scheme.pin(cell as u32);
 }
 
-/// Adds what the functions of the second side do to the equations of the first.
-fn add_interface<const D: usize>(
+/// Two sides of an interface, which may be the same.
+struct Coupling<'a, const D: usize> {
+    interface: &'a Interface<D>,
+    mine: &'a Side<D>,
+    other: &'a Side<D>,
+}
+
+/// Adds the terms of the other side's functions to the equations of mine.
+fn add_coupling<const D: usize>(
     scheme: &Scheme<'_, D>,
-    interface: &Interface<D>,
-    (mine, other): (&Side<D>, &Side<D>),
+    coupling: &Coupling<'_, D>,
     rows: &mut [f64],
     width: usize,
 ) {
+    let Coupling { interface, mine, other } = coupling;
     let count = scheme.element.count();
     let (own, from) = (scheme.element.trace(mine.trace), scheme.element.trace(other.trace));
     let (mut own_slopes, mut slopes) = ([0.0; MOST], [0.0; MOST]);

@@ -23,8 +23,8 @@
 use atomesh::geometry::{Point, difference, dot};
 
 use super::element::{Affine, Element};
-use super::{DgOptions, Form};
-use crate::grid::Grid;
+use super::options::{DgOptions, Form};
+use crate::grid::FlowGrid;
 use crate::permeability::Tensor;
 use crate::problem::Condition;
 use crate::setting::Setting;
@@ -87,56 +87,84 @@ struct Flank<const D: usize> {
     penalty: f64,
 }
 
-/// Makes the interface of a facet; `None` where nothing flows because of pressures: sealed facets and those of the
-/// boundary on which the pressure is not given.
-pub(super) fn interface<const D: usize>(
-    grid: &Grid<D>,
-    setting: &Setting<'_, D>,
-    cells: &[Affine<D>],
-    options: &DgOptions,
-    number: usize,
-) -> Option<Interface<D>> {
-    if !is_open(grid, setting, number) {
-        return None;
-    }
-    let facet = &grid.facets()[number];
-    let flank = |cell: u32| flank(grid, setting, &cells[cell as usize], options, (number, cell));
-    let first = flank(facet.cell);
-    let second = facet.neighbour.map(flank);
-    let other = second.as_ref().map_or(0.0, |side| side.permeability);
-    let sum = first.permeability + other;
-    // the first side's weight: 1 on the boundary
-    let weight = if second.is_some() { other / sum } else { 1.0 };
-    let side = |flank: &Flank<D>, weight: f64, sign: f64| Side {
-        cell: flank.cell,
-        trace: flank.trace,
-        direction: flank.direction.map(|x| weight * x),
-        sign,
-    };
-    let penalty = |flank: &Flank<D>, weight: f64| weight * weight * flank.penalty;
-    let mut sigma = penalty(&first, weight);
-    let mut resistance = first.distance / first.permeability;
-    if let Some(second) = &second {
-        sigma += penalty(second, 1.0 - weight);
-        resistance += second.distance / second.permeability;
-    }
-    resistance *= 1.0 / setting.multipliers()[number] - 1.0;
-    let (slope_weight, jump_weight) = weights(options.form, 1.0 / sigma, resistance);
-    Some(Interface {
-        measure: facet.measure(),
-        slope_weight,
-        jump_weight,
-        resistance,
-        sign: if options.form == Form::InteriorPenalty { -1.0 } else { 1.0 },
-        first: side(&first, weight, 1.0),
-        second: second.map(|second| side(&second, 1.0 - weight, -1.0)),
-    })
+/// What interfaces are made from.
+pub(super) struct InterfaceMaker<'a, const D: usize> {
+    pub grid: &'a FlowGrid<D>,
+    pub setting: &'a Setting<'a, D>,
+    /// The map of each cell.
+    pub cells: &'a [Affine<D>],
+    pub options: &'a DgOptions,
 }
 
-fn is_open<const D: usize>(grid: &Grid<D>, setting: &Setting<'_, D>, facet: usize) -> bool {
-    match grid.facets()[facet].neighbour {
-        Some(_) => setting.multipliers()[facet] > 0.0,
-        None => matches!(setting.condition(facet), Some(Condition::Pressure(_))),
+impl<const D: usize> InterfaceMaker<'_, D> {
+    /// The interface of a facet; `None` where nothing flows because of pressures: sealed facets and those of the
+    /// boundary on which the pressure is not given.
+    pub fn interface(&self, facet: usize) -> Option<Interface<D>> {
+        if !self.is_open(facet) {
+            return None;
+        }
+        let own = &self.grid.facets()[facet];
+        let first = self.flank(facet, own.cell);
+        let second = own.neighbour.map(|cell| self.flank(facet, cell));
+        let other = second.as_ref().map_or(0.0, |side| side.permeability);
+        let sum = first.permeability + other;
+        // the first side's weight: 1 on the boundary
+        let weight = if second.is_some() { other / sum } else { 1.0 };
+        let penalty = |flank: &Flank<D>, weight: f64| weight * weight * flank.penalty;
+        let mut sigma = penalty(&first, weight);
+        let mut resistance = first.distance / first.permeability;
+        if let Some(second) = &second {
+            sigma += penalty(second, 1.0 - weight);
+            resistance += second.distance / second.permeability;
+        }
+        resistance *= 1.0 / self.setting.multipliers()[facet] - 1.0;
+        let form = self.options.form;
+        let (slope_weight, jump_weight) = weights(form, 1.0 / sigma, resistance);
+        Some(Interface {
+            measure: own.measure(),
+            slope_weight,
+            jump_weight,
+            resistance,
+            sign: if form == Form::InteriorPenalty { -1.0 } else { 1.0 },
+            first: first.side(weight, 1.0),
+            second: second.map(|second| second.side(1.0 - weight, -1.0)),
+        })
+    }
+
+    fn is_open(&self, facet: usize) -> bool {
+        match self.grid.facets()[facet].neighbour {
+            Some(_) => self.setting.multipliers()[facet] > 0.0,
+            None => matches!(self.setting.condition(facet), Some(Condition::Pressure(_))),
+        }
+    }
+
+    fn flank(&self, facet: usize, cell: u32) -> Flank<D> {
+        let Self { grid, setting, cells, options } = self;
+        let affine = &cells[cell as usize];
+        let measure = grid.facets()[facet].measure();
+        let normal = grid.facets()[facet].area.map(|x| x / measure);
+        let flow = product(&setting.permeability().tensor(cell as usize), &normal);
+        let permeability = dot(&normal, &flow);
+        let away = difference(&grid.facets()[facet].centroid, &affine.centroid);
+        let (order, dimension) = (options.order as f64, D as f64);
+        let trace_bound = order * (order + dimension - 1.0) / dimension * measure
+            / grid.measures()[cell as usize];
+        Flank {
+            cell,
+            trace: trace_of(grid, facet, cell),
+            direction: affine.gradients.map(|gradient| dot(&gradient, &flow)),
+            permeability,
+            distance: dot(&away, &normal).abs(),
+            penalty: options.penalty * (dimension + 1.0) * trace_bound * permeability,
+        }
+    }
+}
+
+impl<const D: usize> Flank<D> {
+    /// The side of a weight and a sign.
+    fn side(&self, weight: f64, sign: f64) -> Side<D> {
+        let direction = self.direction.map(|x| weight * x);
+        Side { cell: self.cell, trace: self.trace, direction, sign }
     }
 }
 
@@ -152,33 +180,8 @@ fn weights(form: Form, s: f64, resistance: f64) -> (f64, f64) {
     }
 }
 
-fn flank<const D: usize>(
-    grid: &Grid<D>,
-    setting: &Setting<'_, D>,
-    affine: &Affine<D>,
-    options: &DgOptions,
-    (facet, cell): (usize, u32),
-) -> Flank<D> {
-    let measure = grid.facets()[facet].measure();
-    let normal = grid.facets()[facet].area.map(|x| x / measure);
-    let flow = product(&setting.permeability().tensor(cell as usize), &normal);
-    let permeability = dot(&normal, &flow);
-    let away = difference(&grid.facets()[facet].centroid, &affine.centroid);
-    let (order, dimension) = (options.order as f64, D as f64);
-    let trace_bound =
-        order * (order + dimension - 1.0) / dimension * measure / grid.measures()[cell as usize];
-    Flank {
-        cell,
-        trace: trace_of(grid, facet, cell),
-        direction: affine.gradients.map(|gradient| dot(&gradient, &flow)),
-        permeability,
-        distance: dot(&away, &normal).abs(),
-        penalty: options.penalty * (dimension + 1.0) * trace_bound * permeability,
-    }
-}
-
 /// The number of a cell's trace on a facet.
-pub(super) fn trace_of<const D: usize>(grid: &Grid<D>, facet: usize, cell: u32) -> u32 {
+pub(super) fn trace_of<const D: usize>(grid: &FlowGrid<D>, facet: usize, cell: u32) -> u32 {
     let mesh = grid.mesh().expect("checked before");
     let own = &mesh.corners()[cell as usize * (D + 1)..(cell as usize + 1) * (D + 1)];
     let facet = grid.facet_corners(facet).expect("facets of a mesh have corners");

@@ -95,7 +95,7 @@ fn balance_pinned<const D: usize>(scheme: &Scheme<'_, D>, sources: &mut [f64]) {
     for (number, facet) in scheme.grid.facets().iter().enumerate() {
         if let Some(Condition::Flux(value)) = scheme.setting.condition(number) {
             excess[compartment_of[facet.cell as usize] as usize] +=
-                facet_integral(scheme, number, &value);
+                scheme.facet_integral(number, &value);
         }
     }
     for (cell, source) in sources.iter_mut().enumerate() {
@@ -104,17 +104,6 @@ fn balance_pinned<const D: usize>(scheme: &Scheme<'_, D>, sources: &mut [f64]) {
             *source -= excess[number] * scheme.grid.measures()[cell] / compartments[number].measure;
         }
     }
-}
-
-/// The integral of a value over a facet, by the rule of the equations.
-pub(super) fn facet_integral<const D: usize>(
-    scheme: &Scheme<'_, D>,
-    facet: usize,
-    value: &Value<'_, D>,
-) -> f64 {
-    let weights = scheme.element.facet_rule.weights.iter().enumerate();
-    let at = |(node, weight): (usize, &f64)| weight * value.at(&scheme.node(facet, node));
-    scheme.grid.facets()[facet].measure() * weights.map(at).sum::<f64>()
 }
 
 fn add_pressure<const D: usize>(

@@ -10,7 +10,7 @@ use super::loads::place;
 use super::quadrature::Rule;
 use super::scheme::{Scheme, gradient, value};
 use crate::error::FlowError;
-use crate::grid::Grid;
+use crate::grid::FlowGrid;
 use crate::problem::Control;
 use crate::setting::well_index;
 use crate::solution::{Solution, WellFlow};
@@ -59,7 +59,7 @@ impl<const D: usize> DgSolution<D> {
     /// If the grid is another one than that solved on.
     pub fn l2_distance(
         &self,
-        grid: &Grid<D>,
+        grid: &FlowGrid<D>,
         includes: impl Fn(usize) -> bool,
         exact: impl Fn(&Point<D>) -> f64,
     ) -> (f64, f64) {

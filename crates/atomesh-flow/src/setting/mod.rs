@@ -7,7 +7,7 @@ mod tests;
 use atomesh::geometry::Sets;
 
 use crate::error::FlowError;
-use crate::grid::{FlowFacet, Grid, cell_mean, facet_integral};
+use crate::grid::{FlowFacet, FlowGrid, cell_mean, facet_integral};
 use crate::permeability::Permeability;
 use crate::problem::{Condition, Control, Problem};
 use wells::place_wells;
@@ -66,7 +66,7 @@ impl<'a, const D: usize> Setting<'a, D> {
     /// # Errors
     /// [`FlowError`] names what is not found, out of range or not finite; and a compartment with a well, a flux or a
     /// source, but no pressure, whose rates do not sum to 0.
-    pub fn new(problem: &'a Problem<'a, D>, grid: &Grid<D>) -> Result<Self, FlowError> {
+    pub fn new(problem: &'a Problem<'a, D>, grid: &FlowGrid<D>) -> Result<Self, FlowError> {
         problem.permeability.check(grid.cell_count())?;
         let multipliers = multipliers(problem, grid)?;
         let conditions = conditions(problem, grid)?;
@@ -145,7 +145,7 @@ impl<'a, const D: usize> Setting<'a, D> {
         &self.sources
     }
 
-    fn find_compartments(&self, grid: &Grid<D>) -> Vec<Compartment> {
+    fn find_compartments(&self, grid: &FlowGrid<D>) -> Vec<Compartment> {
         let count = self.compartment_of.iter().max().map_or(0, |&most| most as usize + 1);
         let none = Compartment {
             cell_count: 0,
@@ -183,7 +183,7 @@ impl<'a, const D: usize> Setting<'a, D> {
         all
     }
 
-    fn check_balance(&self, grid: &Grid<D>) -> Result<(), FlowError> {
+    fn check_balance(&self, grid: &FlowGrid<D>) -> Result<(), FlowError> {
         let whole: f64 = grid.measures().iter().sum();
         for (number, compartment) in self.compartments.iter().enumerate() {
             if compartment.has_pressure || compartment.is_balanced() {
@@ -201,7 +201,7 @@ impl<'a, const D: usize> Setting<'a, D> {
     }
 
     /// What lies in a compartment, in words.
-    fn inside(&self, grid: &Grid<D>, compartment: u32) -> String {
+    fn inside(&self, grid: &FlowGrid<D>, compartment: u32) -> String {
         let within = |cell: u32| self.compartment_of[cell as usize] == compartment;
         let wells = self.wells.iter().filter(|placed| within(placed.cells[0]));
         let mut names: Vec<&str> =
@@ -223,7 +223,7 @@ impl<'a, const D: usize> Setting<'a, D> {
 
 fn multipliers<const D: usize>(
     problem: &Problem<'_, D>,
-    grid: &Grid<D>,
+    grid: &FlowGrid<D>,
 ) -> Result<Vec<f64>, FlowError> {
     let mut multipliers = vec![1.0; grid.facets().len()];
     for barrier in &problem.barriers {
@@ -244,7 +244,7 @@ fn multipliers<const D: usize>(
 
 fn conditions<const D: usize>(
     problem: &Problem<'_, D>,
-    grid: &Grid<D>,
+    grid: &FlowGrid<D>,
 ) -> Result<Vec<Option<u32>>, FlowError> {
     let mut conditions = vec![None; grid.facets().len()];
     for (number, boundary) in problem.boundaries.iter().enumerate() {
@@ -269,7 +269,10 @@ fn conditions<const D: usize>(
     Ok(conditions)
 }
 
-fn facets_named<'g, const D: usize>(grid: &'g Grid<D>, name: &str) -> Result<&'g [u32], FlowError> {
+fn facets_named<'g, const D: usize>(
+    grid: &'g FlowGrid<D>,
+    name: &str,
+) -> Result<&'g [u32], FlowError> {
     match grid.sets().iter().find(|set| set.name == name) {
         Some(set) => Ok(&set.facets),
         None => {
@@ -281,7 +284,7 @@ fn facets_named<'g, const D: usize>(grid: &'g Grid<D>, name: &str) -> Result<&'g
 }
 
 /// The compartment of each cell, numbered in the order of their lowest cells.
-fn compartments<const D: usize>(grid: &Grid<D>, multipliers: &[f64]) -> Vec<u32> {
+fn compartments<const D: usize>(grid: &FlowGrid<D>, multipliers: &[f64]) -> Vec<u32> {
     let mut sets = Sets::new(grid.cell_count());
     for (facet, &multiplier) in grid.facets().iter().zip(multipliers) {
         if let Some(other) = facet.neighbour.filter(|_| multiplier > 0.0) {

@@ -5,7 +5,7 @@ use std::f64::consts::PI;
 use atomesh::geometry::Sets;
 
 use crate::error::FlowError;
-use crate::grid::Grid;
+use crate::grid::FlowGrid;
 use crate::problem::{Control, Problem, Well};
 
 /// A well with the cells that it flows into.
@@ -27,7 +27,7 @@ pub struct PlacedWell {
 /// [`FlowError`] names a well outside the mesh, or with a number that is not finite.
 pub(super) fn place_wells<const D: usize>(
     problem: &Problem<'_, D>,
-    grid: &Grid<D>,
+    grid: &FlowGrid<D>,
     multipliers: &[f64],
 ) -> Result<Vec<PlacedWell>, FlowError> {
     let place = |(number, well): (usize, &Well<D>)| {
@@ -55,7 +55,7 @@ pub(super) fn place_wells<const D: usize>(
 }
 
 /// The cells that can be reached from the lowest one through facets between them that are no barrier.
-fn one_side<const D: usize>(grid: &Grid<D>, multipliers: &[f64], cells: Vec<u32>) -> Vec<u32> {
+fn one_side<const D: usize>(grid: &FlowGrid<D>, multipliers: &[f64], cells: Vec<u32>) -> Vec<u32> {
     let mut sets = Sets::new(cells.len());
     for (at, &cell) in cells.iter().enumerate() {
         for &facet in grid.facets_of(cell as usize) {

@@ -1,6 +1,6 @@
 //! Which unknowns join in one of the next level, and how that one interpolates to them.
 
-use super::Sparse;
+use super::sparse::Sparse;
 
 /// Unknowns are strongly coupled if `|a_ij| > θ √(a_ii a_jj)`, θ halved from level to level (Vaněk, Mandel & Brezina
 /// 1996).

@@ -2,7 +2,8 @@
 
 use rayon::prelude::*;
 
-use super::{SolveError, Sparse};
+use super::error::SolveError;
+use super::sparse::Sparse;
 
 /// Rows of blocks that one thread treats at a time.
 const ROWS: usize = 512;

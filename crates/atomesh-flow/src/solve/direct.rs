@@ -12,7 +12,9 @@ use faer::sparse::linalg::{LuError, qr};
 use faer::sparse::{FaerError, SparseColMatRef, SymbolicSparseColMatRef};
 use faer::{Conj, MatMut, Par, Side};
 
-use super::{Elimination, SolveError, Sparse};
+use super::error::SolveError;
+use super::order::Elimination;
+use super::sparse::Sparse;
 
 /// Bytes that factors take for each value of a Cholesky factor as counted, by measurement on meshes: with the rows'
 /// numbers and the space in which they are made, and twice as much without symmetry, where pivots add to it.

@@ -1,12 +1,12 @@
 //! Preconditioned conjugate gradients (Hestenes & Stiefel 1952) and BiCGSTAB (van der Vorst 1992).
 //!
 //! Both follow the residual by a recursion that drifts from the truth by rounding. So they end only when the true
-//! residual is small enough, and begin anew from it otherwise, as long as that halves it: where it does not, the
+//! residual is small enough, and restart from it otherwise, as long as that halves it: where it does not, the
 //! residual is rounding, and no iteration makes it smaller.
 
 use atomesh::watch::{Cancelled, Phase, Watch, check};
 
-use super::Sparse;
+use super::sparse::Sparse;
 use super::vector::{dot, norm, update};
 
 /// An approximate inverse: linear, the same each time, symmetric where conjugate gradients use it.
@@ -24,9 +24,18 @@ pub struct Goal {
     pub limit: usize,
 }
 
+/// The equations `A x = b`.
+#[derive(Clone, Copy, Debug)]
+pub struct Equations<'a> {
+    /// A.
+    pub matrix: &'a Sparse,
+    /// b.
+    pub rhs: &'a [f64],
+}
+
 /// Where iteration ended.
 #[derive(Clone, Debug)]
-pub struct Outcome {
+pub struct Found {
     /// The answer.
     pub x: Vec<f64>,
     /// How many iterations.
@@ -34,13 +43,8 @@ pub struct Outcome {
 }
 
 /// [`conjugate_gradients`] or [`bicgstab`].
-pub type Solver = fn(
-    &Sparse,
-    &[f64],
-    &mut dyn Preconditioner,
-    Goal,
-    &mut dyn Watch,
-) -> Result<Outcome, Cancelled>;
+pub type Solver =
+    fn(Equations<'_>, &mut dyn Preconditioner, Goal, &mut dyn Watch) -> Result<Found, Cancelled>;
 
 /// One run from a residual: makes `x` better until `enough(‖r‖)`, the limit, or a breakdown.
 type Run =
@@ -82,13 +86,12 @@ impl Progress<'_> {
 /// # Errors
 /// [`Cancelled`].
 pub fn conjugate_gradients(
-    matrix: &Sparse,
-    rhs: &[f64],
+    equations: Equations<'_>,
     inverse: &mut dyn Preconditioner,
     goal: Goal,
     watch: &mut dyn Watch,
-) -> Result<Outcome, Cancelled> {
-    iterate(matrix, rhs, inverse, goal, (run_conjugate_gradients, watch))
+) -> Result<Found, Cancelled> {
+    iterate(equations, inverse, goal, run_conjugate_gradients, watch)
 }
 
 /// Solves `A x = b` from x = 0.
@@ -96,22 +99,22 @@ pub fn conjugate_gradients(
 /// # Errors
 /// [`Cancelled`].
 pub fn bicgstab(
-    matrix: &Sparse,
-    rhs: &[f64],
+    equations: Equations<'_>,
     inverse: &mut dyn Preconditioner,
     goal: Goal,
     watch: &mut dyn Watch,
-) -> Result<Outcome, Cancelled> {
-    iterate(matrix, rhs, inverse, goal, (run_bicgstab, watch))
+) -> Result<Found, Cancelled> {
+    iterate(equations, inverse, goal, run_bicgstab, watch)
 }
 
 fn iterate(
-    matrix: &Sparse,
-    rhs: &[f64],
+    equations: Equations<'_>,
     inverse: &mut dyn Preconditioner,
     goal: Goal,
-    (run, watch): (Run, &mut dyn Watch),
-) -> Result<Outcome, Cancelled> {
+    run: Run,
+    watch: &mut dyn Watch,
+) -> Result<Found, Cancelled> {
+    let Equations { matrix, rhs } = equations;
     let scale = norm(rhs);
     let target = goal.tolerance * scale;
     let (limit, first) = (goal.limit, scale);
@@ -131,7 +134,7 @@ fn iterate(
             matrix.residual(rhs, &iteration.x, &mut iteration.r);
         }
     }
-    Ok(Outcome { x: best.0, iterations: progress.iterations })
+    Ok(Found { x: best.0, iterations: progress.iterations })
 }
 
 fn run_conjugate_gradients(

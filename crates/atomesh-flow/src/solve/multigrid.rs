@@ -13,7 +13,8 @@ use atomesh::geometry::Point;
 use super::aggregate::{aggregates, smoothed};
 use super::direct::Factors;
 use super::krylov::Preconditioner;
-use super::{Elimination, Sparse};
+use super::order::Elimination;
+use super::sparse::Sparse;
 
 /// A level of so few unknowns is solved by factors.
 const COARSEST: usize = 1000;
@@ -97,7 +98,7 @@ impl<'a> Last<'a> {
         places: &[Point<D>],
         is_symmetric: bool,
     ) -> Self {
-        let elimination = Elimination::new(&matrix, 1, places, (!is_symmetric, MEMORY as f64));
+        let elimination = Elimination::new(&matrix, 1, places, !is_symmetric, MEMORY as f64);
         match Factors::new(&matrix, &elimination, is_symmetric, MEMORY) {
             Ok(factors) => Self::Factors(Box::new(factors)),
             Err(_) => Self::Sweeps(Sweeps::new(matrix)),

@@ -6,7 +6,7 @@
 
 use atomesh::geometry::Point;
 
-use super::Sparse;
+use super::sparse::Sparse;
 
 /// Parts of so few blocks are not halved.
 const LEAF: usize = 8;
@@ -98,7 +98,8 @@ impl Elimination {
         matrix: &Sparse,
         block: usize,
         places: &[Point<D>],
-        (has_pivots, limit): (bool, f64),
+        has_pivots: bool,
+        limit: f64,
     ) -> Self {
         assert_eq!(places.len() * block, matrix.row_count(), "a place for each block");
         let mut graph = Graph::of(matrix, block);
@@ -110,19 +111,12 @@ impl Elimination {
         let (blocks, counts) = postorder(&graph, blocks, limit / (size * size));
         let sum =
             |power: i32| counts.iter().map(|&count| f64::from(count).powi(power)).sum::<f64>();
+        let exceeds = counts.is_empty() && !blocks.is_empty();
         let unknowns = |&own: &u32| (0..block as u32).map(move |inner| own * block as u32 + inner);
         Self {
             order: blocks.iter().flat_map(unknowns).collect(),
-            values: if counts.is_empty() && !blocks.is_empty() {
-                f64::INFINITY
-            } else {
-                size * size * sum(1)
-            },
-            work: if counts.is_empty() && !blocks.is_empty() {
-                f64::INFINITY
-            } else {
-                size.powi(3) * sum(2)
-            },
+            values: if exceeds { f64::INFINITY } else { size * size * sum(1) },
+            work: if exceeds { f64::INFINITY } else { size.powi(3) * sum(2) },
         }
     }
 }
@@ -199,7 +193,7 @@ fn dissect<const D: usize>(graph: &Graph, places: &[Point<D>]) -> Vec<u32> {
         let own = &mut blocks[start..end];
         let middle = halve(own, places);
         stamp += 2;
-        let [first, second] = separate(graph, own, middle, (&mut side, stamp));
+        let [first, second] = separate(graph, own, middle, &mut side, stamp);
         parts.push((start, start + first));
         parts.push((start + first, start + second));
     }
@@ -212,7 +206,8 @@ fn separate(
     graph: &Graph,
     own: &mut [u32],
     middle: usize,
-    (side, stamp): (&mut [u32], u32),
+    side: &mut [u32],
+    stamp: u32,
 ) -> [usize; 2] {
     for (at, &block) in own.iter().enumerate() {
         side[block as usize] = stamp + u32::from(at >= middle);

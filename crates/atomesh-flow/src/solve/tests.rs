@@ -6,6 +6,7 @@ use proptest::prelude::*;
 use rand::{RngExt, SeedableRng};
 use rand_pcg::Pcg64;
 
+use super::vector::norm;
 use super::*;
 
 /// Equations that own their parts.
@@ -31,7 +32,7 @@ impl<const D: usize> Owned<D> {
 
     fn answer(
         &self,
-        method: Method,
+        method: SolveMethod,
         is_symmetric: bool,
     ) -> Result<(Vec<f64>, SolveReport), SolveError> {
         let options = SolveOptions { method, ..Default::default() };
@@ -40,11 +41,11 @@ impl<const D: usize> Owned<D> {
 }
 
 /// All ways to solve symmetric equations.
-const WAYS: [(Method, bool); 4] = [
-    (Method::Direct, true),
-    (Method::Iterative, true),
-    (Method::Direct, false),
-    (Method::Iterative, false),
+const WAYS: [(SolveMethod, bool); 4] = [
+    (SolveMethod::Direct, true),
+    (SolveMethod::Iterative, true),
+    (SolveMethod::Direct, false),
+    (SolveMethod::Iterative, false),
 ];
 
 /// Two-point flux on n^D unit cubes of permeability k, pressure 0 at a distance of one beyond both ends of each axis.
@@ -96,7 +97,7 @@ fn sines_are_divided_by_their_eigenvalues<const D: usize>(n: usize) {
         let error = farthest(&x, &exact);
         assert!(error < 1e-9, "{report:?}: {error}");
         assert!(report.residual <= 1e-12, "{report:?}");
-        assert_eq!(report.iterations > 0, method == Method::Iterative);
+        assert_eq!(report.iterations > 0, method == SolveMethod::Iterative);
     }
 }
 
@@ -172,7 +173,7 @@ proptest! {
         let own = dominant(count, block, seed, is_symmetric);
         let exact = dense_answer(&own.matrix, &own.rhs).unwrap();
         let size = exact.iter().fold(0.0_f64, |most, x| most.max(x.abs()));
-        for method in [Method::Direct, Method::Iterative, Method::Auto] {
+        for method in [SolveMethod::Direct, SolveMethod::Iterative, SolveMethod::Auto] {
             let (x, report) = own.answer(method, is_symmetric).unwrap();
             // dominant by a tenth: a condition number of some 10² beside a residual of 10⁻¹²
             prop_assert!(farthest(&x, &exact) <= 1e-9 * size, "{:?}", report);
@@ -189,7 +190,7 @@ proptest! {
         let rhs: Vec<f64> = rhs.into_iter().map(f64::from).collect();
         let places = (0..6 / block).map(|at| [at as f64, 0.0]).collect();
         let own = Owned::<2> { matrix, rhs, block, places, coarse: None };
-        for method in [Method::Direct, Method::Iterative, Method::Auto] {
+        for method in [SolveMethod::Direct, SolveMethod::Iterative, SolveMethod::Auto] {
             if let Ok((x, report)) = own.answer(method, is_symmetric) {
                 let mut rest = vec![0.0; 6];
                 own.matrix.residual(&own.rhs, &x, &mut rest);
@@ -206,7 +207,7 @@ proptest! {
         if coincide {
             own.places.iter_mut().for_each(|place| place[1] = place[0].round());
         }
-        let order = Elimination::new(&own.matrix, block, &own.places, (false, f64::INFINITY)).order;
+        let order = Elimination::new(&own.matrix, block, &own.places, false, f64::INFINITY).order;
         let mut sorted = order.clone();
         sorted.sort_unstable();
         prop_assert_eq!(sorted, (0..(count * block) as u32).collect::<Vec<_>>());
@@ -220,7 +221,7 @@ proptest! {
         count in 1_usize..40, seed: u64,
     ) {
         let own = dominant(count, 1, seed, true);
-        let plan = Elimination::new(&own.matrix, 1, &own.places, (false, f64::INFINITY));
+        let plan = Elimination::new(&own.matrix, 1, &own.places, false, f64::INFINITY);
         let mut full = vec![vec![false; count]; count];
         own.matrix.entries().for_each(|(i, j, _)| full[i][j] = true);
         let mut expected = (0.0, 0.0);
@@ -235,7 +236,7 @@ proptest! {
             }
         }
         prop_assert_eq!((plan.values, plan.work), expected);
-        let short = Elimination::new(&own.matrix, 1, &own.places, (false, expected.0 - 1.0));
+        let short = Elimination::new(&own.matrix, 1, &own.places, false, expected.0 - 1.0);
         prop_assert_eq!(short.values, f64::INFINITY);
     }
 }
@@ -243,12 +244,12 @@ proptest! {
 #[test]
 fn dissection_fills_less_than_rows_one_after_another() {
     let own = cubes::<2>(60, |_| 1.0);
-    let plan = Elimination::new(&own.matrix, 1, &own.places, (false, f64::INFINITY));
+    let plan = Elimination::new(&own.matrix, 1, &own.places, false, f64::INFINITY);
     // by rows a factor holds a band of 60; by dissection some 31/8 log₂ n² of them (George 1973), n = 60: 46, less
     // the leaves
     assert!(plan.values < 30.0 * 3600.0, "{}", plan.values / 3600.0);
     let along = vec![[0.0]; 3600];
-    let bad = Elimination::new(&own.matrix, 1, &along, (false, f64::INFINITY));
+    let bad = Elimination::new(&own.matrix, 1, &along, false, f64::INFINITY);
     assert!(plan.values < bad.values, "places matter");
 }
 
@@ -258,7 +259,7 @@ fn permeability_over_eight_decades_is_solved_alike_by_all_ways() {
     let k = |cell: usize| 10.0_f64.powf(8.0 * decades[cell]);
     let mut own = cubes::<3>(15, k);
     own.rhs[7 + 15 * (7 + 15 * 7)] = 1.0;
-    let (reference, _) = own.answer(Method::Direct, true).unwrap();
+    let (reference, _) = own.answer(SolveMethod::Direct, true).unwrap();
     let size = reference.iter().fold(0.0_f64, |most, x| most.max(x.abs()));
     for (method, is_symmetric) in WAYS {
         let (x, report) = own.answer(method, is_symmetric).unwrap();
@@ -273,7 +274,7 @@ fn iterations_hardly_grow_with_the_mesh() {
     let iterations = |n: usize| {
         let mut own = cubes::<2>(n, |_| 1.0);
         own.rhs = random(1, n * n);
-        own.answer(Method::Iterative, true).unwrap().1.iterations
+        own.answer(SolveMethod::Iterative, true).unwrap().1.iterations
     };
     let (few, many) = (iterations(40), iterations(160));
     assert!(many <= few + few / 2, "{few}, {many}: a Krylov method alone takes four times as many");
@@ -324,9 +325,9 @@ fn a_coarse_space_keeps_iterations_few() {
     let iterations = |n: usize, has_coarse: bool| {
         let mut own = broken_squares(n);
         own.coarse = own.coarse.filter(|_| has_coarse);
-        let reference = own.answer(Method::Direct, true).unwrap().0;
+        let reference = own.answer(SolveMethod::Direct, true).unwrap().0;
         let counts = [true, false].map(|is_symmetric| {
-            let (x, report) = own.answer(Method::Iterative, is_symmetric).unwrap();
+            let (x, report) = own.answer(SolveMethod::Iterative, is_symmetric).unwrap();
             assert!(farthest(&x, &reference) < 1e-8, "{report:?}");
             report.iterations
         });
@@ -364,7 +365,7 @@ fn equations_without_an_answer_are_errors() {
 fn what_is_not_finite_is_named() {
     let mut own = cubes::<2>(3, |_| 1.0);
     own.rhs[4] = f64::NAN;
-    let error = own.answer(Method::Auto, true).unwrap_err();
+    let error = own.answer(SolveMethod::Auto, true).unwrap_err();
     assert!(matches!(error, SolveError::NotFinite { equation: 4, .. }));
 }
 
@@ -399,7 +400,7 @@ fn bits_do_not_depend_on_threads() {
         pool.install(|| {
             let bits = |x: Vec<f64>| x.into_iter().map(f64::to_bits).collect::<Vec<_>>();
             let scalar = WAYS.map(|(method, symmetric)| own.answer(method, symmetric).unwrap().0);
-            let blocks = broken.answer(Method::Iterative, true).unwrap().0;
+            let blocks = broken.answer(SolveMethod::Iterative, true).unwrap().0;
             (scalar.map(bits), bits(blocks))
         })
     };
@@ -438,9 +439,9 @@ fn factors_larger_than_memory_are_an_error_and_auto_goes_on() {
     let mut own = cubes::<2>(30, |_| 1.0);
     own.rhs[0] = 1.0;
     let options = |method| SolveOptions { method, memory: 1000, ..Default::default() };
-    let error = solve(&own.system(true), &options(Method::Direct), &mut Silent).unwrap_err();
+    let error = solve(&own.system(true), &options(SolveMethod::Direct), &mut Silent).unwrap_err();
     assert_eq!(error, SolveError::Memory { unknowns: 900 });
-    let (_, report) = solve(&own.system(true), &options(Method::Auto), &mut Silent).unwrap();
+    let (_, report) = solve(&own.system(true), &options(SolveMethod::Auto), &mut Silent).unwrap();
     assert!(report.iterations > 0);
 }
 
@@ -448,7 +449,7 @@ fn factors_larger_than_memory_are_an_error_and_auto_goes_on() {
 fn iteration_that_may_not_end_is_an_error() {
     let mut own = cubes::<2>(40, |_| 1.0);
     own.rhs[0] = 1.0;
-    let options = SolveOptions { method: Method::Iterative, limit: 2, ..Default::default() };
+    let options = SolveOptions { method: SolveMethod::Iterative, limit: 2, ..Default::default() };
     let error = solve(&own.system(true), &options, &mut Silent).map(|found| found.1).unwrap_err();
     assert!(matches!(error, SolveError::NotConverged { iterations: 2, .. }), "{error}");
 }

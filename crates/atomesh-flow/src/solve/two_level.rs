@@ -9,9 +9,11 @@ use std::borrow::Cow;
 use atomesh::geometry::Point;
 
 use super::blocks::Blocks;
+use super::error::SolveError;
 use super::krylov::Preconditioner;
 use super::multigrid::{Multigrid, means};
-use super::{SolveError, Sparse, System};
+use super::sparse::Sparse;
+use super::system::System;
 
 /// Sweeps and coarse correction.
 pub struct TwoLevel<'a> {

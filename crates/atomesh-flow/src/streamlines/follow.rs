@@ -2,10 +2,12 @@
 
 use atomesh::geometry::Point;
 
-use super::pieces::{Beyond, Field, Piece};
+use super::line::{End, Streamline};
+use super::options::{Porosity, TraceOptions};
+use super::pieces::{Beyond, FluxField, Piece};
 use super::simplex::{Corners, exit};
 use super::starts::Start;
-use super::{End, Porosity, Streamline, TraceOptions};
+use super::wells::WellExchange;
 use crate::setting::Setting;
 
 /// A line that has not moved for so many steps circles around a corner.
@@ -21,7 +23,7 @@ struct Sink<const D: usize> {
 
 /// Follows lines in a field.
 pub struct Tracer<'a, const D: usize> {
-    field: &'a Field<'a, D>,
+    field: &'a FluxField<'a, D>,
     porosity: Porosity<'a>,
     limit: usize,
     sinks: Vec<Sink<D>>,
@@ -29,47 +31,16 @@ pub struct Tracer<'a, const D: usize> {
     sink_of: Vec<u32>,
 }
 
-/// What flows out of and into a well's cells through the facets around them, and the volume of their pores.
-pub struct WellCells {
-    pub outward: f64,
-    pub inward: f64,
-    pub pores: f64,
-}
-
-impl WellCells {
-    pub fn new<const D: usize>(
-        field: &Field<'_, D>,
-        cells: &[u32],
-        porosity: &Porosity<'_>,
-    ) -> Self {
-        let mut own = Self { outward: 0.0, inward: 0.0, pores: 0.0 };
-        for &cell in cells {
-            let cell = cell as usize;
-            own.pores += porosity.of(cell) * field.grid.measures()[cell];
-            for &facet in field.grid.facets_of(cell) {
-                let beyond = field.beyond(cell, facet as usize);
-                if beyond.is_some_and(|other| cells.binary_search(&other).is_ok()) {
-                    continue;
-                }
-                let flux = field.out_of(cell, facet as usize);
-                own.outward += flux.max(0.0);
-                own.inward += (-flux).max(0.0);
-            }
-        }
-        own
-    }
-}
-
 impl<'a, const D: usize> Tracer<'a, D> {
     pub fn new(
-        field: &'a Field<'a, D>,
+        field: &'a FluxField<'a, D>,
         setting: &Setting<'_, D>,
         options: &TraceOptions<'a>,
     ) -> Self {
         let mut sinks = Vec::new();
         let mut sink_of = vec![0; field.grid.cell_count()];
         for placed in setting.wells() {
-            let around = WellCells::new(field, &placed.cells, &options.porosity);
+            let around = WellExchange::new(field, &placed.cells, &options.porosity);
             let takes = field.solution.wells[placed.well].rate < 0.0;
             if !takes || around.inward <= 0.0 || around.outward > 1e-9 * around.inward {
                 continue;
@@ -91,9 +62,9 @@ impl<'a, const D: usize> Tracer<'a, D> {
             to: None,
             end: End::Boundary,
         };
-        if let Some((well, cell, time)) = start.well {
-            line.points[0] = well;
-            push(&mut line, start.place, time, cell);
+        if let Some(lead) = &start.lead {
+            line.points[0] = lead.place;
+            push(&mut line, start.place, lead.time, lead.cell);
         }
         let mut at = At { numbers: start.numbers, weights: start.weights };
         let mut into = (start.facet, start.into);

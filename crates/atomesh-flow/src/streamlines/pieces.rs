@@ -8,7 +8,7 @@ use atomesh::geometry::{Point, Simplex, difference, dot};
 use atomesh::voronoi::PolyMesh;
 
 use super::simplex::Corners;
-use crate::grid::Grid;
+use crate::grid::FlowGrid;
 use crate::setting::Setting;
 use crate::solution::Solution;
 
@@ -19,8 +19,8 @@ const ROUNDING: f64 = 1e-13;
 pub const CENTROID: u32 = u32::MAX;
 
 /// Fluxes that lines may follow.
-pub struct Field<'a, const D: usize> {
-    pub grid: &'a Grid<D>,
+pub struct FluxField<'a, const D: usize> {
+    pub grid: &'a FlowGrid<D>,
     /// What flows out of each facet's `cell`; 0 where a facet is sealed, or on the boundary has no condition.
     pub fluxes: Vec<f64>,
     pub solution: &'a Solution<D>,
@@ -28,8 +28,8 @@ pub struct Field<'a, const D: usize> {
     least: f64,
 }
 
-impl<'a, const D: usize> Field<'a, D> {
-    pub fn new(grid: &'a Grid<D>, setting: &Setting<'_, D>, solution: &'a Solution<D>) -> Self {
+impl<'a, const D: usize> FluxField<'a, D> {
+    pub fn new(grid: &'a FlowGrid<D>, setting: &Setting<'_, D>, solution: &'a Solution<D>) -> Self {
         let largest = solution.fluxes.iter().fold(0.0_f64, |most, flux| most.max(flux.abs()));
         let least = ROUNDING * largest;
         let open = |facet: usize| {

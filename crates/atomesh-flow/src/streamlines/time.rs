@@ -4,10 +4,10 @@ use std::collections::VecDeque;
 
 use atomesh::watch::{Phase, Watch, check};
 
-use super::Porosity;
-use super::pieces::Field;
+use super::options::Porosity;
+use super::pieces::FluxField;
 use crate::error::FlowError;
-use crate::grid::Grid;
+use crate::grid::FlowGrid;
 use crate::setting::Setting;
 use crate::solution::Solution;
 
@@ -22,14 +22,14 @@ const SWEEPS: usize = 1000;
 /// # Errors
 /// [`FlowError::Porosity`], [`FlowError::PorosityCount`], [`FlowError::Cancelled`].
 pub fn time_of_flight<const D: usize>(
-    grid: &Grid<D>,
+    grid: &FlowGrid<D>,
     setting: &Setting<'_, D>,
     solution: &Solution<D>,
     porosity: Porosity<'_>,
     watch: &mut dyn Watch,
 ) -> Result<Vec<f64>, FlowError> {
     porosity.check(grid.cell_count())?;
-    let field = Field::new(grid, setting, solution);
+    let field = FluxField::new(grid, setting, solution);
     let (order, sorted) = flow_order(&field);
     let mut times = vec![f64::INFINITY; grid.cell_count()];
     let update = |cell: usize, times: &mut Vec<f64>| {
@@ -69,7 +69,7 @@ pub fn time_of_flight<const D: usize>(
 
 /// The cells, each after all that flow into it, and how many could be ordered so. Where only cycles are left the one
 /// that flow reached first goes on, so that sweeps in this order need be few.
-fn flow_order<const D: usize>(field: &Field<'_, D>) -> (Vec<u32>, usize) {
+fn flow_order<const D: usize>(field: &FluxField<'_, D>) -> (Vec<u32>, usize) {
     let grid = field.grid;
     let count = grid.cell_count();
     let into = |cell: usize| {

@@ -3,7 +3,7 @@
 use atomesh::geometry::{Point, difference, distance_squared};
 use atomesh::voronoi::{BoundaryConnection, PolyMesh, boundary_connections};
 
-use crate::grid::{Grid, facet_integral};
+use crate::grid::{FlowGrid, facet_integral};
 use crate::problem::{Condition, Value};
 use crate::setting::Setting;
 
@@ -32,7 +32,7 @@ pub(super) struct Sides {
 /// Finds what holds. A cell whose site lies on two sides of given pressure obeys the one named last.
 pub(super) fn sides<const D: usize>(
     cells: &PolyMesh<D>,
-    grid: &Grid<D>,
+    grid: &FlowGrid<D>,
     setting: &Setting<'_, D>,
 ) -> Sides {
     let mut fixed = vec![None; cells.cell_count()];

@@ -9,7 +9,7 @@ use super::boundary::{Side, Sides};
 use super::shares::share;
 use super::well::Coupling;
 use crate::error::FlowError;
-use crate::grid::Grid;
+use crate::grid::FlowGrid;
 use crate::problem::Control;
 use crate::setting::Setting;
 use crate::solution::{Solution, WellFlow};
@@ -20,7 +20,7 @@ const NONE: u32 = u32::MAX;
 
 /// The equations, with all that the fluxes are made from.
 pub(super) struct Equations<'a, const D: usize> {
-    grid: &'a Grid<D>,
+    grid: &'a FlowGrid<D>,
     setting: &'a Setting<'a, D>,
     /// Of faces between two cells.
     inner: Vec<f64>,
@@ -34,7 +34,7 @@ pub(super) struct Equations<'a, const D: usize> {
 
 impl<'a, const D: usize> Equations<'a, D> {
     pub fn new(
-        grid: &'a Grid<D>,
+        grid: &'a FlowGrid<D>,
         setting: &'a Setting<'a, D>,
         inner: Vec<f64>,
         sides: Sides,

@@ -28,12 +28,12 @@ use atomesh::voronoi::PolyMesh;
 use atomesh::watch::{Phase, Watch, check};
 
 use crate::error::FlowError;
-use crate::grid::Grid;
+use crate::grid::FlowGrid;
 use crate::setting::Setting;
 use crate::solution::Solution;
 use crate::solve::SolveOptions;
 
-/// Steady flow on Voronoi cells. `grid` is [`Grid::of_cells`] of `cells`, with any sets added, and `setting` is of
+/// Steady flow on Voronoi cells. `grid` is [`FlowGrid::of_cells`] of `cells`, with any sets added, and `setting` is of
 /// that grid. Pressures are those at the sites.
 ///
 /// Cost: that of solving one equation a cell. Reports [`Phase::Assemble`] and [`Phase::Solve`] to `watch`.
@@ -47,7 +47,7 @@ use crate::solve::SolveOptions;
 /// If the grid is not of these cells.
 pub fn solve<const D: usize>(
     cells: &PolyMesh<D>,
-    grid: &Grid<D>,
+    grid: &FlowGrid<D>,
     setting: &Setting<'_, D>,
     options: &SolveOptions,
     watch: &mut dyn Watch,

@@ -3,13 +3,13 @@
 
 use atomesh::geometry::{Point, dot};
 
-use crate::grid::Grid;
+use crate::grid::FlowGrid;
 
 /// Shares what has to flow out of a cell, `excess`, among its `fixed` faces on sides, whose entries in `fluxes` are 0
 /// until then: the velocity that fits the cell's other faces best in the least squares, through each of them, and
 /// the rest by area. So a uniform velocity is exact in the corners of the box, too.
 pub(super) fn share<const D: usize>(
-    grid: &Grid<D>,
+    grid: &FlowGrid<D>,
     cell: usize,
     fixed: &[u32],
     excess: f64,
@@ -31,7 +31,7 @@ pub(super) fn share<const D: usize>(
 
 /// The least sum of (flux − v · area)² / area over the faces that are not fixed; `None` if they do not tell v.
 fn velocity<const D: usize>(
-    grid: &Grid<D>,
+    grid: &FlowGrid<D>,
     cell: usize,
     fixed: &[u32],
     fluxes: &[f64],

@@ -9,7 +9,7 @@ use atomesh::watch::Silent;
 use crate::error::FlowError;
 use crate::problem::Control;
 use crate::setting::{PlacedWell, Setting, well_index};
-use crate::solve::{Method, SolveOptions, Sparse, System, solve};
+use crate::solve::{SolveMethod, SolveOptions, Sparse, System, solve};
 
 /// How many rings of cells around a well [`solve`](super::solve()) looks at for its equivalent radius. Measured: on
 /// squares 8 rings come within 0.1 % of what infinitely many give, 1 ring within 5 %.
@@ -150,7 +150,7 @@ impl<'a, const D: usize> Around<'a, D> {
             places: &places,
             coarse: None,
         };
-        let options = SolveOptions { method: Method::Direct, ..SolveOptions::default() };
+        let options = SolveOptions { method: SolveMethod::Direct, ..SolveOptions::default() };
         Ok(solve(&system, &options, &mut Silent)?.0[0])
     }
 
