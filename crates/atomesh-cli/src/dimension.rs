@@ -5,8 +5,8 @@ use atomesh::mesh::Mesh;
 use atomesh::run::Method;
 use atomesh::voronoi::PolyMesh;
 use atomesh_draw::{
-    DrawError, FlowPicture, FlowStyle, Picture, Style, draw_flat, draw_flow, draw_flow_slices,
-    draw_polygons, draw_polyhedra, draw_slices,
+    DrawError, FlowPicture, FlowStyle, Picture, Style, draw_flow, draw_flow_slices, draw_polygons,
+    draw_polyhedra, draw_slices, draw_triangles,
 };
 use atomesh_io::image::AnyImage;
 
@@ -33,7 +33,7 @@ impl Dimension<2> {
     pub fn flat() -> Self {
         Self {
             method: Method::flat(),
-            draw: draw_flat,
+            draw: draw_triangles,
             draw_cells: draw_polygons,
             draw_flow: |flow, style, flow_style| draw_flow(flow, style, flow_style),
             image: |any| match any {

@@ -1,7 +1,7 @@
 //! Colours for numbers: lightness rises evenly from the least to the greatest, so that the order shows in
 //! grey too and to those who see fewer colours.
 
-use crate::Color;
+use crate::style::Color;
 
 /// The colours that a map is cut into, so that shapes of one colour can be drawn together.
 pub(crate) const LEVELS: usize = 64;

@@ -1,6 +1,6 @@
 //! The few letters that name slices and colours, and digits, as strokes: no font is needed, and PNG and SVG agree.
 
-use crate::picture::{Place, Rect, Shape};
+use crate::shape::{Place, Rect, Shape};
 
 /// The height of a letter in pixels; its width is 0.7 of it.
 const HEIGHT: f64 = 13.0;

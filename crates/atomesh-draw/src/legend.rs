@@ -2,7 +2,8 @@
 
 use crate::color_map::{ColorMap, LEVELS, Range};
 use crate::label::lettering;
-use crate::picture::{Picture, Place, Rect, Shape};
+use crate::picture::Picture;
+use crate::shape::{Place, Rect, Shape};
 
 /// The width in pixels that is added for bars, and the blank around them.
 const STRIP: u32 = 104;

@@ -2,21 +2,21 @@
 
 use tiny_skia::{FillRule, LineCap, Paint, PathBuilder, Pixmap, Stroke, Transform};
 
-use crate::picture::{Picture, Place, Shape};
+use crate::error::DrawError;
 use crate::raster::Raster;
-use crate::{Color, DrawError};
+use crate::shape::{Place, Shape};
+use crate::style::Color;
 
 /// Lines in one path: the rasteriser sorts a path's edges, so short paths are faster.
 const LINES_PER_PATH: usize = 2048;
 
-/// The picture as an RGB PNG.
-pub(crate) fn encode(picture: &Picture) -> Result<Vec<u8>, DrawError> {
-    let (width, height) = (picture.width, picture.height);
+/// A picture of that width and height as an RGB PNG.
+pub(crate) fn encode([width, height]: [u32; 2], shapes: &[Shape]) -> Result<Vec<u8>, DrawError> {
     let mut pixmap = Pixmap::new(width, height).ok_or_else(|| DrawError::Png {
         reason: format!("{width} × {height} pixels are too many"),
     })?;
     pixmap.fill(tiny_skia::Color::WHITE);
-    for shape in &picture.shapes {
+    for shape in shapes {
         draw(&mut pixmap, shape);
     }
     let rgb: Vec<u8> =

@@ -2,7 +2,7 @@
 
 use atomesh::image::Units;
 
-use crate::DrawError;
+use crate::error::DrawError;
 
 /// An opaque colour: red, green and blue.
 pub type Color = [u8; 3];

@@ -7,9 +7,9 @@
 use atomesh::geometry::Point;
 use atomesh::image::Image;
 
-use crate::Style;
-use crate::picture::{Place, Rect, Shape};
 use crate::raster::Ramp;
+use crate::shape::{Place, Rect, Shape};
+use crate::style::Style;
 
 /// How far the box is turned about the vertical, and how far the eye is above it, in radians.
 const TURN: f64 = 0.6;
@@ -83,8 +83,8 @@ impl Camera {
         std::array::from_fn(|k| (0..3).map(|axis| p[axis] * self.axes[axis][k]).sum())
     }
 
-    /// The scale and the shift that put a box of these sides into the middle of the rectangle.
-    pub fn fit(&self, sides: &Point<3>, rect: &Rect) -> (f64, Place) {
+    /// What puts a box of these sides into the middle of the rectangle.
+    pub fn fit(&self, sides: &Point<3>, rect: &Rect) -> Fit {
         let corners = (0..8).map(|i| {
             let corner = std::array::from_fn(|k| if i >> k & 1 == 1 { sides[k] } else { 0.0 });
             self.project(&corner)
@@ -98,7 +98,21 @@ impl Camera {
         let scale = |k: usize| rect.size[k] * (1.0 - 2.0 * MARGIN) / (max[k] - min[k]);
         let scale = scale(0).min(scale(1));
         let middle = |k: usize| rect.corner[k] + rect.size[k] / 2.0;
-        (scale, std::array::from_fn(|k| middle(k) - scale * (min[k] + max[k]) / 2.0))
+        let shift = std::array::from_fn(|k| middle(k) - scale * (min[k] + max[k]) / 2.0);
+        Fit { scale, shift }
+    }
+}
+
+/// How what a camera sees is scaled and then shifted to fit into its panel.
+#[derive(Clone, Copy)]
+pub(crate) struct Fit {
+    scale: f64,
+    shift: Place,
+}
+
+impl Fit {
+    pub fn place(&self, seen: Place) -> Place {
+        std::array::from_fn(|k| self.shift[k] + self.scale * seen[k])
     }
 }
 
@@ -109,7 +123,7 @@ struct View<'a> {
     step: [f64; 3],
     ramp: Ramp,
     camera: Camera,
-    fit: (f64, Place),
+    fit: Fit,
 }
 
 impl View<'_> {
@@ -133,15 +147,11 @@ impl View<'_> {
         let raster = self.ramp.raster(self.image.samples(), columns.len(), rows.len(), |i, j| {
             first + i * strides[right] + j * strides[down]
         });
-        let (scale, shift) = self.fit;
-        let place = |p: Point<3>| -> Place {
-            let flat = self.camera.project(&p);
-            std::array::from_fn(|k| shift[k] + scale * flat[k])
-        };
         let side = |axis: usize, count: usize| -> Place {
-            self.camera.axes[axis].map(|v| v * scale * self.step[axis] * count as f64)
+            self.camera.axes[axis].map(|v| v * self.fit.scale * self.step[axis] * count as f64)
         };
-        let corner = place(std::array::from_fn(|k| start[k] as f64 * self.step[k]));
+        let first = std::array::from_fn(|k| start[k] as f64 * self.step[k]);
+        let corner = self.fit.place(self.camera.project(&first));
         let (right, down) = (side(right, columns.len()), side(down, rows.len()));
         let add = |a: Place, b: Place| [a[0] + b[0], a[1] + b[1]];
         let others = [add(corner, right), add(add(corner, right), down), add(corner, down)];

@@ -1,8 +1,8 @@
 //! Vectors as arrows: which are drawn, how long, and their outline.
 
-use crate::picture::Place;
+use crate::shape::Place;
 
-/// A vector in a sheet: where its middle is, where it points, in pixels.
+/// A vector on a canvas: where its middle is, where it points, in pixels.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(super) struct Vector {
     pub middle: Place,

@@ -1,6 +1,6 @@
 //! Polygons and lines cut by a rectangle.
 
-use crate::picture::{Place, Rect};
+use crate::shape::{Place, Rect};
 
 /// The part of a polygon within a rectangle (Sutherland & Hodgman 1974): cut by one side after another. Parts of
 /// one that is not convex stay joined along the sides, where they have no area.

@@ -4,12 +4,12 @@
 
 use atomesh::geometry::{Point, difference, dot};
 
-use super::sheet::{Looks, Mark, mark_shapes};
-use super::slices::Scene;
-use crate::Color;
+use super::canvas::{Appearance, Mark, mark_shapes};
+use super::scene::Scene;
 use crate::color_map::PLASMA;
-use crate::picture::{Place, Rect, Shape};
-use crate::view::{BACKGROUND, Camera, OUTLINE, view};
+use crate::shape::{Place, Rect, Shape};
+use crate::style::Color;
+use crate::view::{BACKGROUND, Camera, Fit, OUTLINE, view};
 
 /// The width of streamlines in pixels.
 const LINE: f64 = 1.6;
@@ -18,7 +18,7 @@ const LINE: f64 = 1.6;
 const BARRIER: [f64; 2] = [110.0, 225.0];
 
 /// The panel: barriers, streamlines and wells; the slices of the image if there are none.
-pub(super) fn in_space(scene: &Scene, looks: &Looks, rect: Rect) -> Vec<Shape> {
+pub(super) fn in_space(scene: &Scene, look: &Appearance, rect: Rect) -> Vec<Shape> {
     let flow = scene.flow;
     let is_empty = flow.barriers.is_empty() && flow.lines.is_empty() && flow.wells.is_empty();
     if let (Some(image), true) = (flow.image, is_empty) {
@@ -37,7 +37,7 @@ pub(super) fn in_space(scene: &Scene, looks: &Looks, rect: Rect) -> Vec<Shape> {
         let places = corners.iter().map(|p| eye.place(p)).collect();
         pieces.push((depth, eye.shade(&corners), Piece::Facet(places)));
     }
-    if let Some(range) = looks.time {
+    if let Some(range) = look.time {
         for line in flow.lines {
             for (ends, times) in line.points.windows(2).zip(line.times.windows(2)) {
                 let color = PLASMA.at(range.share(0.5 * (times[0] + times[1])));
@@ -92,7 +92,7 @@ fn painted(pieces: Vec<(f64, Color, Piece)>) -> Vec<Shape> {
 struct Eye<'a> {
     scene: &'a Scene<'a>,
     camera: Camera,
-    fit: (f64, Place),
+    fit: Fit,
 }
 
 impl<'a> Eye<'a> {
@@ -108,9 +108,7 @@ impl<'a> Eye<'a> {
     }
 
     fn place(&self, p: &Point<3>) -> Place {
-        let (scale, shift) = self.fit;
-        let flat = self.camera.project(&self.in_box(p));
-        std::array::from_fn(|k| shift[k] + scale * flat[k])
+        self.fit.place(self.camera.project(&self.in_box(p)))
     }
 
     /// How far away the middle of some points is, and the middle.
