@@ -8,8 +8,8 @@ use rand_pcg::Pcg64;
 
 use crate::grid::{FacetSet, FlowGrid};
 
-/// Points of a lattice of `steps` steps along each axis of the box, those inside moved at random by up to `jitter`
-/// (below 0.5) of a step along each axis, those on the boundary within their face or edge. Corners stay.
+/// Points of a lattice of `steps` steps along each axis of the box, each moved at random by up to `jitter` (below 0.5) of
+/// a step along each axis. Points on the boundary stay on their face or edge, corners in place.
 pub(crate) fn jittered_points<const D: usize>(
     bounds: &Bounds<D>,
     steps: [usize; D],
@@ -61,7 +61,7 @@ pub(crate) fn grid<const D: usize>(mesh: &Mesh<D>, groups: Vec<FacetGroup<D>>) -
     FlowGrid::of_mesh(mesh, &tags.expect("names of their own"))
 }
 
-/// Names the facets inside the mesh of which `holds` is true of every corner.
+/// Names the inner facets for all of whose corners `holds` is true.
 pub(crate) fn name_inner_facets<const D: usize>(
     grid: &mut FlowGrid<D>,
     name: &str,

@@ -1,7 +1,7 @@
-//! The equations: which cells each cell's rows name, and their values.
+//! The matrix: the columns of each cell's rows, and their values.
 //!
-//! Each cell gathers its own rows from its facets, so that cells can be done at the same time and sums have a fixed
-//! order, at the cost of looking at every facet from both sides.
+//! Each cell gathers its own rows from its facets, so that cells can be done in parallel and sums have a fixed
+//! order. The price is that every facet is evaluated from both sides.
 
 use std::ops::Range;
 
@@ -13,9 +13,9 @@ use super::interface::{Interface, Side, product};
 use super::scheme::Scheme;
 use crate::solve::Sparse;
 
-/// Cells whose rows are made in one go.
+/// Cells whose rows are made by one task.
 const BLOCK: usize = 256;
-/// Blocks between two looks at the watch.
+/// Blocks between two steps of the watch.
 const STRIDE: usize = 64;
 
 /// Rows of consecutive cells.
@@ -74,8 +74,8 @@ fn rows<const D: usize>(scheme: &Scheme<'_, D>, cells: Range<usize>) -> Rows {
     rows
 }
 
-/// The cells that a cell's rows name, ascending, itself among them: those beyond facets that something flows
-/// through, and those of the same wells of given pressure.
+/// The cells to which a cell is coupled, ascending, itself included: those beyond open facets, and those of the same
+/// wells of given pressure.
 fn find_beside<const D: usize>(scheme: &Scheme<'_, D>, cell: usize, beside: &mut Vec<u32>) {
     beside.clear();
     beside.push(cell as u32);
@@ -91,7 +91,7 @@ fn find_beside<const D: usize>(scheme: &Scheme<'_, D>, cell: usize, beside: &mut
     beside.dedup();
 }
 
-/// Fills a cell's rows, each as wide as the functions of the cells `beside`.
+/// Fills a cell's rows, whose columns are the functions of the cells `beside`.
 fn fill<const D: usize>(scheme: &Scheme<'_, D>, cell: usize, beside: &[u32], rows: &mut [f64]) {
     let count = scheme.element.count();
     let width = beside.len() * count;
@@ -104,7 +104,7 @@ fn fill<const D: usize>(scheme: &Scheme<'_, D>, cell: usize, beside: &[u32], row
         let flow = product(&tensor, &affine.gradients[a]);
         affine.gradients.map(|gradient| measure * atomesh::geometry::dot(&flow, &gradient))
     });
-    // each row from the cell's own column on: the last row may end there
+    // slices start at the cell's own columns, so the last row may be shorter than `width`
     scheme.element.add_stiffness(&metric, &mut rows[own..], width);
     for &facet in scheme.grid.facets_of(cell) {
         if let Some(interface) = &scheme.interfaces[facet as usize] {

@@ -1,4 +1,4 @@
-//! How pressures beside a facet make the flux through it.
+//! The flux through a facet from the pressures on its two sides.
 //!
 //! With n out of the first cell, the jump `[p] = p₁ − p₂` and the weighted mean `g = {k ∂p/∂n}`, the flux is
 //! `F = b [p] − a g`, and the equations hold the terms
@@ -7,18 +7,18 @@
 //! F(p) [v] ∓ a ([p] + ε g(p)) g(v)        − symmetric, + Oden, Babuška & Baumann
 //! ```
 //!
-//! in which ε is the resistance of a barrier, across which `[p] = −ε g`; 0 where there is none. Both are then consistent
-//! if `a + b ε = 1`. With s the inverse of the penalty σ:
+//! in which ε is the resistance of a barrier, across which `[p] = −ε g`; 0 without one. Both forms are consistent
+//! if `a + b ε = 1`. With s = 1/σ, σ the penalty:
 //!
-//! - symmetric: `a = s/(ε + s)`, `b = 1/(ε + s)` (Juntunen & Stenberg 2009), which is the interior penalty at ε = 0
-//!   (`a = 1`, `b = σ`) and no flow at ε = ∞, and is as stable for any ε between;
-//! - Oden, Babuška & Baumann: `b = ε/(ε + s)²`, `a = 1 − bε`, which is theirs at ε = 0 (`a = 1`, `b = 0`) and no flow at
-//!   ε = ∞. The terms with a cancel in the energy, but for `a ε g²`, and b is never below 0.
+//! - symmetric: `a = s/(ε + s)`, `b = 1/(ε + s)` (Juntunen & Stenberg 2009): the interior penalty at ε = 0
+//!   (`a = 1`, `b = σ`), no flow at ε = ∞, and as stable for any ε between;
+//! - Oden, Babuška & Baumann: `b = ε/(ε + s)²`, `a = 1 − bε`: their form at ε = 0 (`a = 1`, `b = 0`), no flow at
+//!   ε = ∞. The terms with a cancel in the energy, except `a ε g²`, and b is never below 0.
 //!
-//! The mean is weighted by the permeability of the other side, so that the penalty is by the harmonic mean of the
-//! two (Ern, Stephansen & Zunino 2009), and σ is such that the energy stays above 0, by the sharp inequality
-//! between a polynomial of degree p − 1 in a cell, such as its slope, and on a facet (Warburton & Hesthaven 2003):
-//! `‖w‖²_F ≤ p (p + D − 1)/D · |F|/|K| ‖w‖²_K`. Each of the D + 1 facets may take as much of a cell's energy.
+//! The mean is weighted by the permeability of the other side, so that the penalty grows with the harmonic mean of the
+//! two (Ern, Stephansen & Zunino 2009). σ keeps the energy positive. It follows from the sharp trace inequality for
+//! polynomials w of degree p − 1, such as a slope (Warburton & Hesthaven 2003),
+//! `‖w‖²_F ≤ p (p + D − 1)/D · |F|/|K| ‖w‖²_K`, summed over the D + 1 facets of a cell.
 
 use atomesh::geometry::{Point, difference, dot};
 
@@ -42,7 +42,7 @@ pub(super) struct Side<const D: usize> {
     pub sign: f64,
 }
 
-/// A facet through which something flows because of pressures.
+/// A facet through which pressures drive a flux.
 #[derive(Clone, Debug)]
 pub(super) struct Interface<const D: usize> {
     /// The facet's area, or length.
@@ -73,7 +73,7 @@ impl<const D: usize> Interface<D> {
     }
 }
 
-/// What is known of one side before the two are weighed.
+/// One side of a facet before its weight is known.
 struct Flank<const D: usize> {
     cell: u32,
     trace: u32,
@@ -83,7 +83,7 @@ struct Flank<const D: usize> {
     permeability: f64,
     /// The centroid's distance from the facet.
     distance: f64,
-    /// What the penalty must be, were the weight 1.
+    /// The penalty for a weight of 1.
     penalty: f64,
 }
 
@@ -97,8 +97,8 @@ pub(super) struct InterfaceMaker<'a, const D: usize> {
 }
 
 impl<const D: usize> InterfaceMaker<'_, D> {
-    /// The interface of a facet; `None` where nothing flows because of pressures: sealed facets and those of the
-    /// boundary on which the pressure is not given.
+    /// The interface of a facet; `None` where pressures drive no flux: sealed facets, and those of the boundary without a
+    /// given pressure.
     pub fn interface(&self, facet: usize) -> Option<Interface<D>> {
         if !self.is_open(facet) {
             return None;
@@ -173,7 +173,7 @@ fn weights(form: Form, s: f64, resistance: f64) -> (f64, f64) {
     let sum = resistance + s;
     match form {
         Form::InteriorPenalty => (s / sum, 1.0 / sum),
-        // 1 − ε²/(ε + s)², without the difference of what is nearly equal
+        // a = 1 − ε²/(ε + s)², without cancellation
         Form::OdenBabuskaBaumann => {
             (s * (2.0 * resistance + s) / (sum * sum), resistance / (sum * sum))
         }

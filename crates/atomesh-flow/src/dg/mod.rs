@@ -1,17 +1,16 @@
 //! Discontinuous Galerkin on triangles and tetrahedra.
 //!
-//! In each cell the pressure is a polynomial; nothing joins those of neighbours but the flux between them (see
-//! `interface`), so pressure may jump, mass balances in every cell, and a fault is a facet through which less flows,
-//! or nothing. Permeability is a number or a tensor, constant in each cell.
+//! In each cell the pressure is a polynomial, coupled to its neighbours' only by the fluxes through facets (see
+//! `interface`). So pressure may jump, mass balances in every cell, and a fault is a facet with a reduced flux, or
+//! none. Permeability is a number or a tensor, constant in each cell.
 //!
-//! 1. maps of the cells and interfaces of the facets are made (`scheme`), of polynomials that are orthonormal in every
+//! 1. `scheme`: maps of the cells and interfaces of the facets, from polynomials that are orthonormal in every
 //!    cell (`basis`) and tables that all cells share (`element`, `quadrature`);
-//! 2. what the source term, wells and the boundary bring is the right-hand side (`loads`); cells write their rows of
-//!    the matrix (`assemble`);
-//! 3. the equations are solved, with the continuous linear functions as the space of the smooth part (`coarse`);
-//! 4. fluxes are read off (`solution`), and what solving left unbalanced is sent away (`balance`).
+//! 2. `loads`: the right-hand side, from source term, wells and boundary; `assemble`: the matrix, each cell its rows;
+//! 3. `coarse`: the continuous linear functions, the coarse space for solving;
+//! 4. `solution`: fluxes from the pressures; `balance`: corrects them so that every cell balances to rounding.
 //!
-//! Assumes cells of positive measure, such as [`atomesh::mesh::Mesh::validate`] finds. Cost besides solving: O(cells).
+//! Assumes cells of positive measure, as [`atomesh::mesh::Mesh::validate`] checks. Cost besides solving: O(cells).
 //! The same bits at any number of threads.
 
 mod assemble;
@@ -40,9 +39,9 @@ use crate::solve::{self, System};
 use options::MOST_ORDER;
 use scheme::Scheme;
 
-/// About how much memory [`solve()`] takes for a grid, in bytes, where it iterates: 34 for each entry of the matrix, that
-/// is for each pair of functions in a cell and the cells beside it, and 260 for each unknown. Measured; factors, where
-/// they are taken, keep to [`SolveOptions::memory`](crate::solve::SolveOptions::memory).
+/// An estimate of the memory that [`solve()`] takes when it iterates, in bytes: 34 for each entry of the matrix, that
+/// is for each pair of functions in a cell and the cells beside it, and 260 for each unknown. Measured. Factors keep
+/// to [`SolveOptions::memory`](crate::solve::SolveOptions::memory).
 pub fn memory<const D: usize>(grid: &FlowGrid<D>, options: &DgOptions) -> u64 {
     let block = (1..=D).fold(1, |n, k| n * (options.order.min(MOST_ORDER) + k) / k) as u64;
     let inner = grid.facets().iter().filter(|facet| facet.neighbour.is_some()).count() as u64;
@@ -55,8 +54,8 @@ pub fn memory<const D: usize>(grid: &FlowGrid<D>, options: &DgOptions) -> u64 {
 /// Reports [`Phase::Assemble`] and [`Phase::Solve`].
 ///
 /// # Errors
-/// [`FlowError`]: an order or penalty out of range, a grid of other than triangles or tetrahedra, a well whose radius
-/// does not fit, equations that were not solved, or the watch.
+/// [`FlowError`]: an order or penalty out of range, a grid of Voronoi cells, a well radius out of range, equations that
+/// were not solved, or the watch.
 pub fn solve<const D: usize>(
     grid: &FlowGrid<D>,
     setting: &Setting<'_, D>,

@@ -33,19 +33,19 @@ pub(super) struct Scheme<'a, const D: usize> {
     pub setting: &'a Setting<'a, D>,
     pub element: Element<D>,
     pub cells: Vec<Affine<D>>,
-    /// By facet; `None` where nothing flows because of pressures.
+    /// By facet; `None` where pressures drive no flux.
     pub interfaces: Vec<Option<Interface<D>>>,
     pub pressure_wells: Vec<PressureWell>,
-    /// By compartment: pressures are solved for less this one, so that a large constant costs no digits.
+    /// By compartment: pressures are solved for relative to this one, so that a large constant costs no digits.
     pub references: Vec<f64>,
     /// Cells of wells of given pressure, ascending, each with the well's place in `pressure_wells`.
     well_cells: Vec<(u32, usize)>,
-    /// Cells in which a pressure is pinned, ascending, each with the index of the well that does it.
+    /// Cells in which a pressure is pinned, ascending, each with the index of the well that pins it.
     pins: Vec<(u32, f64)>,
 }
 
 impl<'a, const D: usize> Scheme<'a, D> {
-    /// Makes it, the mesh and options checked by the caller.
+    /// Makes the scheme; the caller has checked the options.
     pub fn new(
         grid: &'a FlowGrid<D>,
         setting: &'a Setting<'a, D>,
@@ -106,7 +106,7 @@ impl<'a, const D: usize> Scheme<'a, D> {
         self.references[self.setting.compartment_of()[cell] as usize]
     }
 
-    /// What flows through a facet, out of its cell, if the pressures less their reference have these coefficients.
+    /// The flux through a facet, out of its cell, for these coefficients of the pressures relative to their references.
     pub fn flux(&self, facet: usize, coefficients: &[f64]) -> f64 {
         let Some(interface) = &self.interfaces[facet] else {
             return match self.setting.condition(facet) {
@@ -161,7 +161,7 @@ impl<'a, const D: usize> Scheme<'a, D> {
     }
 }
 
-/// The middle of the least and the greatest pressure that is given in each compartment; 0 without one.
+/// The middle between the least and the greatest given pressure of each compartment; 0 without one.
 fn references<const D: usize>(grid: &FlowGrid<D>, setting: &Setting<'_, D>) -> Vec<f64> {
     let mut ranges = vec![(f64::INFINITY, f64::NEG_INFINITY); setting.compartments().len()];
     let mut include = |cell: u32, pressure: f64| {

@@ -1,4 +1,4 @@
-//! A problem placed on a grid: every name found, every compartment solvable.
+//! A problem placed on a grid: every name found, every compartment known to have a solution.
 
 mod wells;
 #[cfg(test)]
@@ -13,15 +13,15 @@ use crate::problem::{Condition, Control, Problem};
 use wells::place_wells;
 pub use wells::{PlacedWell, well_index};
 
-/// Rates that sum to less than this share of their magnitudes sum to 0.
+/// Rates whose sum is below this share of the sum of their magnitudes balance.
 const BALANCED: f64 = 1e-9;
 
 /// Cells between which something can flow.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Compartment {
-    /// How many cells.
+    /// The number of cells.
     pub cell_count: usize,
-    /// Their volume (area in 2-D).
+    /// Their area (plane) or volume (space).
     pub measure: f64,
     /// The lowest cell.
     pub first: u32,
@@ -44,7 +44,7 @@ impl Compartment {
     }
 }
 
-/// A problem placed on a grid, found to have an answer.
+/// A problem placed on a grid and known to have a solution.
 #[derive(Clone, Debug)]
 pub struct Setting<'a, const D: usize> {
     problem: &'a Problem<'a, D>,
@@ -58,14 +58,14 @@ pub struct Setting<'a, const D: usize> {
 
 impl<'a, const D: usize> Setting<'a, D> {
     /// Finds the facets and cells that the problem names, and the compartments that its sealed barriers
-    /// (multiplier 0) cut the grid into. Cost: O(cells), and as much for each well.
+    /// (multiplier 0) cut the grid into. Cost: O(cells · (1 + wells)).
     ///
-    /// A well in a place that more cells than one share, such as a point of the mesh, flows into all of them, as
-    /// far as no barrier lies between.
+    /// A well at a place that several cells share, such as a point of the mesh, flows into all of them that no
+    /// barrier separates from the lowest one.
     ///
     /// # Errors
-    /// [`FlowError`] names what is not found, out of range or not finite; and a compartment with a well, a flux or a
-    /// source, but no pressure, whose rates do not sum to 0.
+    /// [`FlowError`] names what is not found, out of range or not finite, and a compartment without a given pressure
+    /// whose rates do not sum to 0.
     pub fn new(problem: &'a Problem<'a, D>, grid: &FlowGrid<D>) -> Result<Self, FlowError> {
         problem.permeability.check(grid.cell_count())?;
         let multipliers = multipliers(problem, grid)?;
@@ -105,13 +105,13 @@ impl<'a, const D: usize> Setting<'a, D> {
         &self.multipliers
     }
 
-    /// The condition on a facet of the boundary, if there is one. `None` elsewhere: nothing flows.
+    /// The condition on a facet of the boundary; `None` without one, so that nothing flows.
     pub fn condition(&self, facet: usize) -> Option<Condition<'a, D>> {
         let number = self.conditions[facet]?;
         Some(self.problem.boundaries[number as usize].condition)
     }
 
-    /// The number in the problem of the condition on a facet of the boundary.
+    /// The problem's number of the condition on a facet of the boundary.
     ///
     /// # Panics
     /// If there is none.
@@ -129,7 +129,7 @@ impl<'a, const D: usize> Setting<'a, D> {
         &self.compartments
     }
 
-    /// The compartments whose pressure nothing fixes, each with the cell in which schemes make its mean 0.
+    /// The compartments whose pressure nothing fixes, each with the cell whose mean pressure schemes set to 0.
     pub fn pinned(&self) -> impl Iterator<Item = (usize, u32)> + '_ {
         let all = self.compartments.iter().enumerate();
         all.filter(|(_, own)| !own.has_pressure).map(|(number, own)| (number, own.first))
@@ -140,7 +140,7 @@ impl<'a, const D: usize> Setting<'a, D> {
         &self.compartment_of
     }
 
-    /// What the source term brings into each cell, wells apart.
+    /// What the source term q brings into each cell, without wells.
     pub fn sources(&self) -> &[f64] {
         &self.sources
     }
@@ -200,7 +200,7 @@ impl<'a, const D: usize> Setting<'a, D> {
         Ok(())
     }
 
-    /// What lies in a compartment, in words.
+    /// Names of the wells and boundaries of a compartment.
     fn inside(&self, grid: &FlowGrid<D>, compartment: u32) -> String {
         let within = |cell: u32| self.compartment_of[cell as usize] == compartment;
         let wells = self.wells.iter().filter(|placed| within(placed.cells[0]));

@@ -11,7 +11,7 @@ pub enum SolveError {
     Singular {
         /// The number of unknowns.
         unknowns: usize,
-        /// The unknown at which that was seen.
+        /// The unknown at which that was found.
         at: usize,
     },
     /// The factors would take too much memory.
@@ -22,14 +22,14 @@ pub enum SolveError {
         /// The number of unknowns.
         unknowns: usize,
     },
-    /// Iteration came to its limit.
+    /// Iteration reached its limit, or stalled.
     #[error(
         "{method} left a residual of {residual:.1e} after {iterations} iterations; expected {tolerance:.1e}"
     )]
     NotConverged {
         /// The method.
         method: &'static str,
-        /// How many iterations.
+        /// The number of iterations.
         iterations: usize,
         /// ‖b − Ax‖ / ‖b‖.
         residual: f64,

@@ -1,7 +1,7 @@
 //! Preconditioned conjugate gradients (Hestenes & Stiefel 1952) and BiCGSTAB (van der Vorst 1992).
 //!
-//! Both follow the residual by a recursion that drifts from the truth by rounding. So they end only when the true
-//! residual is small enough, and restart from it otherwise, as long as that halves it: where it does not, the
+//! Both update the residual by a recursion that rounding makes drift from the true one. So they end only when the true
+//! residual is small enough, and otherwise restart from it, as long as each restart halves it. Where it does not, the
 //! residual is rounding, and no iteration makes it smaller.
 
 use atomesh::watch::{Cancelled, Phase, Watch, check};
@@ -9,7 +9,7 @@ use atomesh::watch::{Cancelled, Phase, Watch, check};
 use super::sparse::Sparse;
 use super::vector::{dot, norm, update};
 
-/// An approximate inverse: linear, the same each time, symmetric where conjugate gradients use it.
+/// An approximate inverse: linear, the same each time, and symmetric for conjugate gradients.
 pub trait Preconditioner {
     /// `z = M⁻¹ r`.
     fn apply(&mut self, r: &[f64], z: &mut [f64]);
@@ -20,7 +20,7 @@ pub trait Preconditioner {
 pub struct Goal {
     /// The residual asked for, ‖b − Ax‖ / ‖b‖.
     pub tolerance: f64,
-    /// The most iterations.
+    /// The largest number of iterations.
     pub limit: usize,
 }
 
@@ -33,12 +33,12 @@ pub struct Equations<'a> {
     pub rhs: &'a [f64],
 }
 
-/// Where iteration ended.
+/// The result of iteration.
 #[derive(Clone, Debug)]
 pub struct Found {
-    /// The answer.
+    /// The solution.
     pub x: Vec<f64>,
-    /// How many iterations.
+    /// The number of iterations.
     pub iterations: usize,
 }
 
@@ -46,7 +46,7 @@ pub struct Found {
 pub type Solver =
     fn(Equations<'_>, &mut dyn Preconditioner, Goal, &mut dyn Watch) -> Result<Found, Cancelled>;
 
-/// One run from a residual: makes `x` better until `enough(‖r‖)`, the limit, or a breakdown.
+/// One run from a residual: improves `x` until ‖r‖ reaches its target, the limit, or a breakdown.
 type Run =
     fn(&mut Iteration<'_>, &mut dyn Preconditioner, &mut Progress<'_>) -> Result<(), Cancelled>;
 
@@ -56,7 +56,7 @@ struct Iteration<'a> {
     r: Vec<f64>,
 }
 
-/// What is left to do, and who is told.
+/// How far the iteration is, and the watch that hears of it.
 struct Progress<'a> {
     watch: &'a mut dyn Watch,
     scale: f64,

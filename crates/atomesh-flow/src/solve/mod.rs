@@ -1,10 +1,10 @@
-//! Sparse linear equations: direct where that is fast, preconditioned iteration beyond.
+//! Sparse linear equations: solved directly where that is fast, else by preconditioned iteration.
 //!
 //! The unknowns come in blocks of one size, those of a cell, and each block has a place, by which the direct solver
 //! orders them (nested dissection, George 1973). Symmetric equations are solved by a Cholesky factor or conjugate
-//! gradients, others by LU or BiCGSTAB. Iteration is preconditioned by algebraic multigrid where a block is one
-//! unknown, by sweeps over blocks and a correction in the coarse space where it is more. Whatever the way, the
-//! residual is computed from the answer, and one that is large is an error.
+//! gradients, others by LU or BiCGSTAB. Iteration is preconditioned by algebraic multigrid if a block is one
+//! unknown, else by sweeps over blocks and a correction in the coarse space. The residual is always computed from the
+//! solution, and a large one is an error.
 
 mod aggregate;
 mod blocks;
@@ -36,17 +36,17 @@ use krylov::{Equations, Goal, Preconditioner, bicgstab, conjugate_gradients};
 use multigrid::Multigrid;
 use two_level::TwoLevel;
 
-/// A larger residual is no answer, whatever the reason.
+/// The largest residual that is accepted as a solution.
 const ACCEPTED: f64 = 1e-8;
-/// Multiplications that factors of equations in space may take before iteration is tried first.
+/// Multiplications for the factors of equations in space, beyond which iteration is tried first.
 const WORK: f64 = 2e10;
 /// Steps of refinement after a direct solution.
 const REFINEMENTS: usize = 3;
 
 /// Solves the equations; the same bits at any number of threads.
 ///
-/// [`SolveMethod::Auto`] takes factors in the plane, in space while they take little work, and wherever blocks of several unknowns
-/// are not symmetric, as long as they fit into memory; else iteration, and factors after all where that fails.
+/// [`SolveMethod::Auto`] uses factors in the plane, in space if they take little work, and wherever blocks of several
+/// unknowns are not symmetric, as long as they fit into memory. Else it iterates, and falls back on factors if that fails.
 ///
 /// # Errors
 /// [`SolveError`].

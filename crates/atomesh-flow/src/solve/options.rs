@@ -1,29 +1,29 @@
 //! How equations are solved.
 
-/// Which way to solve.
+/// How to solve.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, serde::Serialize, serde::Deserialize)]
 #[serde(rename_all = "lowercase")]
 #[non_exhaustive]
 pub enum SolveMethod {
-    /// Direct if the factors are expected to be small, else iterative.
+    /// Direct if the factors are estimated to be small, else iterative.
     #[default]
     Auto,
     /// Sparse Cholesky or LU factors.
     Direct,
-    /// Conjugate gradients, or BiCGSTAB where the matrix is not symmetric, preconditioned.
+    /// Preconditioned conjugate gradients, or BiCGSTAB if the matrix is not symmetric.
     Iterative,
 }
 
 /// Options of [`solve`].
 #[derive(Clone, Copy, Debug, PartialEq, serde::Serialize, serde::Deserialize)]
 pub struct SolveOptions {
-    /// Which way.
+    /// The method. Default auto.
     pub method: SolveMethod,
     /// Iteration ends when ‖b − Ax‖ ≤ tolerance ‖b‖. Default 10⁻¹², so that mass balances to 10⁻¹⁰.
     pub tolerance: f64,
-    /// Iteration fails after so many. Default 2000.
+    /// The largest number of iterations. Default 2000.
     pub limit: usize,
-    /// The most bytes that factors may take. Default 8 GiB.
+    /// The memory that factors may take, in bytes. Default 8 GiB.
     pub memory: u64,
 }
 

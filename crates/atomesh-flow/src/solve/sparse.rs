@@ -4,7 +4,7 @@ use std::ops::Range;
 
 use rayon::prelude::*;
 
-/// Rows that one thread treats at a time; fixed, though each row's bits depend on nothing else.
+/// Rows per task; fixed, though each row's bits depend on nothing else.
 const ROWS: usize = 4096;
 
 /// A sparse matrix by its rows (CSR): columns ascending in each row, none twice.
@@ -54,8 +54,8 @@ impl Sparse {
         Self { column_count, starts, columns, values }
     }
 
-    /// A matrix from entries in any order; those at one place are added in the order given. Cost: O(entries), and a
-    /// sort of each row.
+    /// A matrix from entries in any order; those of one row and column are added in the order given. Cost: O(entries), and
+    /// a sort of each row.
     ///
     /// # Panics
     /// If an entry lies outside of the matrix.
@@ -228,7 +228,7 @@ impl Sparse {
 
     fn product_rows(&self, other: &Self, rows: Range<usize>) -> Part {
         let mut part = Part::default();
-        // where a column's sum stands in `row`; valid if the sum there is of that column
+        // the place of a column's sum in `row`; valid if that entry is of the column
         let mut place = vec![0_u32; other.column_count];
         let mut row: Vec<(u32, f64)> = Vec::new();
         for at in rows {
@@ -255,7 +255,7 @@ impl Sparse {
         part
     }
 
-    /// `Pᵀ A P`, the matrix seen from the space that the columns of P span.
+    /// `Pᵀ A P`, the matrix projected to the space that the columns of P span.
     ///
     /// # Panics
     /// If P has not as many rows as A has rows and columns.

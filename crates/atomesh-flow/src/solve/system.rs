@@ -1,4 +1,4 @@
-//! The equations, and what is told of their solution.
+//! The equations, and the report of their solution.
 
 use atomesh::geometry::Point;
 
@@ -6,7 +6,7 @@ use super::error::SolveError;
 use super::sparse::Sparse;
 use super::vector::norm;
 
-/// Equations in space beyond which factors are not even counted.
+/// Unknowns in space beyond which the cost of factors is not even estimated.
 const MOST_IN_SPACE: usize = 100_000;
 
 /// Equations to solve.
@@ -18,12 +18,12 @@ pub struct System<'a, const D: usize> {
     pub rhs: &'a [f64],
     /// Whether the matrix is symmetric and positive definite.
     pub is_symmetric: bool,
-    /// How many unknowns a block has.
+    /// The number of unknowns of a block.
     pub block: usize,
     /// The place of each block.
     pub places: &'a [Point<D>],
-    /// A space of fewer unknowns that holds the smooth part of the answer: the columns interpolate from it to all
-    /// unknowns. For discontinuous Galerkin the continuous piecewise linear functions (Dobrev et al. 2006).
+    /// The interpolation from a coarse space, which holds the smooth part of the solution, to all unknowns. For
+    /// discontinuous Galerkin the space of continuous piecewise linear functions (Dobrev et al. 2006).
     pub coarse: Option<&'a Sparse>,
 }
 
@@ -64,8 +64,8 @@ impl<const D: usize> System<'_, D> {
         D == 2 || self.rhs.len() <= most
     }
 
-    /// Sweeps over blocks need the blocks on the diagonal to be positive definite. Those of Oden, Babuška and Baumann's form
-    /// are nearly skew, and iteration was seen to stall.
+    /// Sweeps over blocks need positive definite blocks on the diagonal. Those of Oden, Babuška and Baumann's form are
+    /// nearly skew, and iteration was seen to stall.
     pub(super) fn sweeps_may_fail(&self) -> bool {
         !self.is_symmetric && self.block > 1
     }

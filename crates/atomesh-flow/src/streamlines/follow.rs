@@ -10,14 +10,14 @@ use super::starts::Start;
 use super::wells::WellExchange;
 use crate::setting::Setting;
 
-/// A line that has not moved for so many steps circles around a corner.
+/// Steps without moving after which a line is taken to circle around a corner.
 const STILL: usize = 1000;
 
-/// What ends lines: wells that take all that flows into their cells.
+/// A well that ends lines: it takes all that flows into its cells.
 struct Sink<const D: usize> {
     well: usize,
     place: Point<D>,
-    /// From the boundary of its cells to its place.
+    /// The time from the boundary of its cells to its place.
     time: f64,
 }
 
@@ -27,7 +27,7 @@ pub struct Tracer<'a, const D: usize> {
     porosity: Porosity<'a>,
     limit: usize,
     sinks: Vec<Sink<D>>,
-    /// The number of a cell's sink, from 1.
+    /// The number of each cell's sink, from 1; 0 without one.
     sink_of: Vec<u32>,
 }
 
@@ -134,7 +134,7 @@ struct At {
 }
 
 impl At {
-    /// Whether all corners that the place depends on are among the numbers.
+    /// Whether all corners with a weight above 0 are among the numbers.
     fn is_in(&self, numbers: &[u32]) -> bool {
         let corners = self.numbers.iter().zip(&self.weights);
         corners.filter(|(_, weight)| **weight > 0.0).all(|(number, _)| numbers.contains(number))

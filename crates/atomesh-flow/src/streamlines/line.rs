@@ -1,33 +1,33 @@
-//! What a streamline is.
+//! A streamline and its end.
 
 use atomesh::geometry::Point;
 
 /// Why a streamline ends.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, serde::Serialize)]
 pub enum End {
-    /// At a well.
+    /// It reaches a well.
     Well,
-    /// On the boundary, where something flows out.
+    /// It leaves through the boundary.
     Boundary,
-    /// Where nothing flows out of a cell, or around a corner without end.
+    /// Nothing flows out of its cell, or it circles around a corner.
     Stagnation,
-    /// After as many segments as allowed.
+    /// It has as many segments as allowed.
     Limit,
 }
 
-/// The way of a particle.
+/// The path of a particle.
 #[derive(Clone, Debug, PartialEq, serde::Serialize)]
 pub struct Streamline<const D: usize> {
-    /// Its points, from the start on. Two points of a line are apart.
+    /// Its points, from the start on; consecutive points differ.
     #[serde(serialize_with = "as_vectors")]
     pub points: Vec<Point<D>>,
     /// The time of flight from the start to each point.
     pub times: Vec<f64>,
     /// The cell of each segment between two points.
     pub cells: Vec<u32>,
-    /// The well that it comes from, by its number in the problem; `None` from the boundary.
+    /// The problem's number of the well that it comes from; `None` if from the boundary.
     pub from: Option<usize>,
-    /// The well that it goes to.
+    /// The problem's number of the well that it ends at.
     pub to: Option<usize>,
     /// Why it ends.
     pub end: End,

@@ -1,11 +1,11 @@
 //! Streamlines and times of flight, from fluxes through facets alone.
 //!
-//! In a triangle or tetrahedron the velocity is that of the least order that has the cell's fluxes (Raviart & Thomas
+//! In a triangle or tetrahedron the velocity is the lowest-order field with the cell's fluxes (Raviart & Thomas
 //! 1977), `v = Σ F_i (x − x_i) / (D |K|)`, x_i the corner opposite facet i. A line in it is straight, and each
-//! barycentric coordinate follows an equation of its own, so that where and when it leaves is a closed form (Pollock
+//! barycentric coordinate obeys its own equation, so that place and time of exit are a closed form (Pollock
 //! 1988; Matringe, Juanes & Tchelepi 2006). Voronoi cells are cut into simplices about their centroid (`pieces`).
-//! Lines go from simplex to simplex by their corners' numbers, never by searching for a place, so they do not leave
-//! the mesh; a facet without flux is never crossed. Each line stands for the same flow (`starts`).
+//! Lines go from simplex to simplex by their corners' numbers, without searching for places. So they do not leave
+//! the mesh, and never cross a facet without flux. Each line stands for the same flow (`starts`).
 
 mod follow;
 mod line;
@@ -34,16 +34,16 @@ use follow::Tracer;
 use pieces::FluxField;
 use starts::starts;
 
-/// Lines between two looks at the watch.
+/// Lines between two steps of the watch.
 const BATCH: usize = 64;
 
-/// Follows lines from where something flows in, wells in their order and then the boundary, each for the same share of
+/// Follows lines from the inflow, through wells in their order and then the boundary, each for the same share of
 /// the flow. The same bits at any number of threads.
 ///
-/// A line from a well begins at the well's place. Where a well takes all that flows into its cells, lines end at its
-/// place. Between the well and the boundary of its cells the line is straight, and takes the time in which the
-/// well fills, or empties, the pores of its cells: `φ V / Q`, exact for radial flow. What a source term brings in along the way
-/// starts no lines. Cost: O(segments); for Voronoi cells a small dense system for each cell passed.
+/// A line from a well begins at the well's place; lines end at the place of a well that takes all that flows into its
+/// cells. Between the well and the boundary of its cells a line is straight and takes the time in which the
+/// well fills, or empties, the pores of its cells: `φ V / Q`, exact for radial flow. No lines start at a source term.
+/// Cost: O(segments); for Voronoi cells a small dense system for each cell passed.
 ///
 /// # Errors
 /// [`FlowError::Porosity`], [`FlowError::PorosityCount`], [`FlowError::Cancelled`].

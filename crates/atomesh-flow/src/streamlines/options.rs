@@ -1,8 +1,8 @@
-//! How many streamlines, and how fast a particle moves along them.
+//! Options of streamlines, and the porosity that times of flight depend on.
 
 use crate::error::FlowError;
 
-/// The share of a cell that fluid fills, more than 0 and at most 1.
+/// The share of a cell that fluid fills, above 0 and up to 1.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum Porosity<'a> {
     /// The same everywhere.
@@ -12,7 +12,7 @@ pub enum Porosity<'a> {
 }
 
 impl Porosity<'_> {
-    /// Finds the first value that is no porosity.
+    /// Refuses the first value that is not a porosity.
     ///
     /// # Errors
     /// [`FlowError::Porosity`] and [`FlowError::PorosityCount`].
@@ -46,11 +46,11 @@ impl Porosity<'_> {
 /// Options of [`trace`].
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct TraceOptions<'a> {
-    /// How many lines, dealt among wells and boundaries by what flows in there. Default 100.
+    /// How many lines, distributed among wells and boundaries by their inflow. Default 100.
     pub count: usize,
-    /// The porosity. Default 1, so that times are those of the Darcy velocity.
+    /// The porosity. Default 1: times are those of the Darcy velocity.
     pub porosity: Porosity<'a>,
-    /// The most segments of a line. Default 100 000.
+    /// The largest number of segments of a line. Default 100 000.
     pub limit: usize,
 }
 

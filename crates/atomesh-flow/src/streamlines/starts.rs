@@ -1,4 +1,4 @@
-//! Where lines start: around wells that bring something in, and on the boundary where something flows in.
+//! Where lines start: around wells with inflow, and on the boundary where there is inflow.
 
 use std::f64::consts::TAU;
 
@@ -36,7 +36,7 @@ pub struct Lead<const D: usize> {
     pub time: f64,
 }
 
-/// A part of a facet through which something flows in.
+/// A part of a facet with inflow.
 struct Patch<const D: usize> {
     facet: u32,
     into: Option<u32>,
@@ -54,8 +54,8 @@ struct FacetPart<const D: usize> {
     share: f64,
 }
 
-/// The starts, each for the same flow: patches follow each other around wells and boundary, and a start stands in the
-/// middle of its share of them.
+/// The starts, each for the same flow. Patches are put in a row, around each well and then around the boundary; the row
+/// is divided into equal flows, and a start stands in the middle of each.
 pub fn starts<const D: usize>(
     field: &FluxField<'_, D>,
     setting: &Setting<'_, D>,
@@ -89,6 +89,7 @@ pub fn starts<const D: usize>(
     starts
 }
 
+/// The simplices of a facet.
 fn parts<const D: usize>(field: &FluxField<'_, D>, facet: u32) -> Vec<FacetPart<D>> {
     let places = |points: &[Point<D>], corners: [u32; D]| corners.map(|c| points[c as usize]);
     if let Some(mesh) = field.grid.mesh() {
@@ -164,7 +165,8 @@ fn middle<const D: usize>(field: &FluxField<'_, D>) -> Point<D> {
     })
 }
 
-/// In the plane counter-clockwise about a centre, also within a patch, from the widest gap on; in space as they are.
+/// In the plane, orders patches and their corners counter-clockwise about a centre, from the widest gap on; in space the
+/// order stays.
 fn order_around<const D: usize>(patches: &mut [Patch<D>], centre: &Point<D>) {
     if D != 2 {
         return;
@@ -196,7 +198,7 @@ fn order_around<const D: usize>(patches: &mut [Patch<D>], centre: &Point<D>) {
 }
 
 impl<const D: usize> Patch<D> {
-    /// The start at a share of the patch; across it, in space, places follow the golden ratio, which fills evenly.
+    /// The start at a share of the patch. In space the places across it follow the golden ratio, which fills evenly.
     fn start(&self, share: f64, number: usize) -> Start<D> {
         let share = share.clamp(0.0, 1.0);
         let mut own = [0.0; D];

@@ -1,9 +1,9 @@
-//! What a well exchanges with the cells around its own.
+//! What a well's cells exchange with their surroundings.
 
 use super::options::Porosity;
 use super::pieces::FluxField;
 
-/// What flows out of and into a well's cells through the facets around them, and the volume of their pores.
+/// The flow out of and into a well's cells through the facets around them, and the volume of their pores.
 pub struct WellExchange {
     pub outward: f64,
     pub inward: f64,
