@@ -1,4 +1,4 @@
-//! Pictures of meshes over images: PNG by a small rasteriser, SVG by hand, no fonts.
+//! Pictures of meshes over images, as PNG and SVG, without fonts.
 //!
 //! [`draw_triangles`] lays a triangular mesh over its image, as in figure 2 of Hale (2001), or atoms over a
 //! field, as in his figure 5; [`draw_slices`] lays the cuts of a tetrahedral mesh over the three
@@ -8,7 +8,7 @@
 //! or SVG; [`ReportPage`] is a report with its pictures as one HTML file. The same input gives the same bytes.
 //!
 //! Meshes are given in *sample coordinates*: lattice coordinates divided by the grid's step. Row 0 is
-//! on top, x grows to the right. A sample covers the square around its centre, so a picture reaches
+//! at the top, x grows to the right. A sample covers the square around its centre, so a picture reaches
 //! half a sample beyond the mesh.
 
 mod color_map;
@@ -19,6 +19,7 @@ mod flow;
 mod label;
 mod legend;
 mod page;
+mod panel;
 mod picture;
 mod plane;
 mod png_encode;

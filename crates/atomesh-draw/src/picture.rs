@@ -1,4 +1,4 @@
-//! A picture: what is drawn where, in pixels, x to the right and y down.
+//! A picture: a size, and shapes in pixels.
 
 use std::path::Path;
 
@@ -16,7 +16,7 @@ pub enum PictureFormat {
 }
 
 impl PictureFormat {
-    /// The kind that a file's name calls for by its extension, in any case.
+    /// The kind of a file by its extension, in upper or lower case.
     ///
     /// # Errors
     /// [`DrawError::Format`] unless the extension is png or svg.
@@ -55,7 +55,7 @@ impl Picture {
         self.height
     }
 
-    /// How many lines, dots and the like there are: what decides how large it is as SVG.
+    /// The number of lines, dots and other parts, which decides how large it is as SVG.
     pub(crate) fn shape_count(&self) -> usize {
         let count = |shape: &Shape| match shape {
             Shape::Image { .. } | Shape::Fill { .. } => 1,

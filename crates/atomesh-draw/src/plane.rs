@@ -13,13 +13,13 @@ use crate::shape::{Place, Rect, Shape};
 use crate::style::Style;
 
 /// Draws a mesh over an image, as in figure 2 of Hale (2001): greys from black at the least to
-/// [`Style::brightness`] at the greatest sample, edges and, if wanted, atoms on top.
+/// [`Style::brightness`] at the greatest sample, with edges and, optionally, atoms on top.
 ///
 /// The image may be any field on the grid: the image itself, b, or d as in figure 5. The mesh is in
 /// sample coordinates. Cost: O(pixels + samples + cells log cells).
 ///
 /// # Errors
-/// [`DrawError::Style`] if a number of the style has no meaning.
+/// [`DrawError::Style`] if a number of the style is out of range.
 pub fn draw_triangles(
     image: &Image<2>,
     mesh: &Mesh<2>,

@@ -7,7 +7,7 @@ use crate::raster::Raster;
 use crate::shape::{Place, Shape};
 use crate::style::Color;
 
-/// Lines in one path: the rasteriser sorts a path's edges, so short paths are faster.
+/// Lines per path: the rasteriser sorts a path's edges, so short paths are faster.
 const LINES_PER_PATH: usize = 2048;
 
 /// A picture of that width and height as an RGB PNG.
@@ -153,7 +153,7 @@ fn image(pixmap: &mut Pixmap, raster: &Raster, corner: Place, [right, down]: [Pl
     }
 }
 
-/// Which of `count` samples lies at that share of their side.
+/// The number of the sample at a share of the side; `None` outside 0…1.
 fn sample(share: f64, count: usize) -> Option<usize> {
     (0.0..1.0).contains(&share).then(|| ((share * count as f64) as usize).min(count - 1))
 }

@@ -1,4 +1,4 @@
-//! How large a picture is: an edge of typical length is as long as the style says.
+//! The scale of a picture, from the typical length of edges.
 
 use atomesh::geometry::{Point, difference, dot};
 use atomesh::mesh::Mesh;
@@ -8,8 +8,8 @@ use crate::style::Style;
 /// The most cells, faces or edges whose lengths the typical one is the median of.
 pub(crate) const EDGE_SAMPLES: usize = 1 << 14;
 
-/// The median length of the edges of cells spread over the mesh, of samples with sides `step`; `None`
-/// without cells.
+/// The median length of the edges of up to [`EDGE_SAMPLES`] cells spread over the mesh, for samples with sides `step`;
+/// `None` without cells.
 pub(crate) fn typical_length<const D: usize>(mesh: &Mesh<D>, step: &[f64; D]) -> Option<f64> {
     let points = mesh.points();
     let mut lengths = Vec::new();
@@ -31,8 +31,8 @@ pub(crate) fn median(mut lengths: Vec<f64>) -> Option<f64> {
     (!lengths.is_empty()).then(|| *lengths.select_nth_unstable_by(middle, f64::total_cmp).1)
 }
 
-/// Pixels to a unit of length, so that an edge of the given length is as long as the style wants it,
-/// or else the picture of that extent as large as it may be.
+/// Pixels per unit of length: an edge of the given length gets [`Style::edge_pixels`], unless the picture of that extent
+/// would be too large or there is no edge; then the picture is as large as allowed.
 pub(crate) fn scale(edge: Option<f64>, extent: &[f64; 2], style: &Style) -> f64 {
     let largest = style.max_side / extent[0].max(extent[1]);
     match edge {

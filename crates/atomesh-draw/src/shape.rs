@@ -1,4 +1,4 @@
-//! What pictures are made of, in pixels, x to the right and y down.
+//! The shapes of a picture, in pixels, x to the right and y down.
 
 use crate::raster::Raster;
 use crate::style::Color;
@@ -16,8 +16,8 @@ pub(crate) struct Rect {
 /// Something to draw; later shapes cover earlier ones.
 #[derive(Clone, Debug)]
 pub(crate) enum Shape {
-    /// Greys stretched over a parallelogram, each sample a parallelogram of one grey: sample 0 is at
-    /// `corner`, and `right` and `down` are the sides along a row and a column.
+    /// A raster stretched over a parallelogram, each sample a parallelogram of one grey. Sample 0 is at
+    /// `corner`; `right` and `down` are the sides along a row and a column.
     Image { raster: Raster, corner: Place, right: Place, down: Place },
     /// A filled rectangle.
     Fill { rect: Rect, color: Color },
@@ -27,13 +27,12 @@ pub(crate) enum Shape {
     Discs { centers: Vec<Place>, radius: f64, color: Color },
     /// Filled squares of one half side.
     Squares { centers: Vec<Place>, half: f64, color: Color },
-    /// Filled polygons of one colour; not `smooth`, they have no half-covered pixels, so that neighbours
-    /// leave no seam.
+    /// Filled polygons of one colour, antialiased if `smooth`; else neighbours leave no seam.
     Polygons { polygons: Vec<Vec<Place>>, color: Color, smooth: bool },
 }
 
 impl Shape {
-    /// Greys stretched over a rectangle.
+    /// A raster stretched over a rectangle.
     pub fn upright(raster: Raster, rect: Rect) -> Self {
         let ([width, height], corner) = (rect.size, rect.corner);
         Self::Image { raster, corner, right: [width, 0.0], down: [0.0, height] }

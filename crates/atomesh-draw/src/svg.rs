@@ -1,4 +1,4 @@
-//! Pictures as SVG text. Coordinates have two decimals: a hundredth of a pixel.
+//! Pictures as SVG. Coordinates have two decimals, a hundredth of a pixel.
 
 use std::fmt::Write;
 
@@ -58,7 +58,7 @@ fn draw(out: &mut String, shape: &Shape) -> Result<(), DrawError> {
     Ok(())
 }
 
-/// Greys stretched over a parallelogram.
+/// A raster stretched over a parallelogram.
 fn image(
     out: &mut String,
     raster: &Raster,
@@ -100,7 +100,7 @@ fn strokes(out: &mut String, lines: &[[Place; 2]], width: f64, color: Color) {
     );
 }
 
-/// Lines of no length, whose caps are discs or squares.
+/// Discs or squares, as the caps of lines without length.
 fn dots(out: &mut String, centers: &[Place], half: f64, cap: &str, color: Color) {
     let (color, width) = (hex(color), number(2.0 * half));
     let mut d = String::new();

@@ -1,8 +1,8 @@
 //! The three slices of an image in space, as in the upper left of the paper's figure 9.
 //!
 //! A parallel projection from above. The slices cut each other into quarters, which are painted from
-//! the farthest to the nearest: beyond the horizontal slice first, and on each side of it beyond the
-//! slice normal to x first.
+//! the farthest to the nearest: first those beyond the horizontal slice, and on each side of it first those beyond the
+//! slice normal to x.
 
 use atomesh::geometry::Point;
 use atomesh::image::Image;
@@ -18,7 +18,7 @@ const ELEVATION: f64 = 0.45;
 /// The part of the panel that stays empty on each side.
 const MARGIN: f64 = 0.04;
 
-/// The grey of the brightest sample: no edges have to be told from it here.
+/// The grey of the brightest sample; brighter than elsewhere, since there are no edges.
 const BRIGHTNESS: f64 = 0.85;
 
 /// The colours behind the slices and of their outlines.
@@ -57,7 +57,7 @@ enum Half {
     High,
 }
 
-/// Where each axis points on the screen (right, down) and away from the eye.
+/// The direction of each axis in the picture (right, down), and the direction away from the eye.
 #[derive(Clone, Copy)]
 pub(crate) struct Camera {
     axes: [Place; 3],
@@ -65,7 +65,7 @@ pub(crate) struct Camera {
 }
 
 impl Camera {
-    /// z points down, or up; y then points toward the eye, or away, so that nothing is mirrored.
+    /// If z points down, y points toward the eye; if z points up, away from it. So nothing is mirrored.
     pub fn new(z_up: bool) -> Self {
         let sign = if z_up { 1.0 } else { -1.0 };
         let ((sin, cos), (rise, run)) = (TURN.sin_cos(), ELEVATION.sin_cos());
@@ -103,7 +103,7 @@ impl Camera {
     }
 }
 
-/// How what a camera sees is scaled and then shifted to fit into its panel.
+/// The scale and then the shift that fit what a camera sees into its panel.
 #[derive(Clone, Copy)]
 pub(crate) struct Fit {
     scale: f64,

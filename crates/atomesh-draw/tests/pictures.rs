@@ -259,7 +259,10 @@ fn places_and_styles_without_a_meaning_are_refused() {
         assert!(refused.to_string().starts_with("brightness is "), "{refused}");
     }
     let unknown = PictureFormat::of(Path::new("a.gif")).unwrap_err();
-    assert_eq!(unknown.to_string(), "\"a.gif\" is no picture by its name; expected .png or .svg");
+    assert_eq!(
+        unknown.to_string(),
+        "\"a.gif\" is not the name of a picture; expected .png or .svg"
+    );
     assert_eq!(PictureFormat::of(Path::new("a.SVG")), Ok(PictureFormat::Svg));
 }
 

@@ -10,14 +10,14 @@ use crate::legend::Bar;
 use crate::shape::{Place, Rect, Shape};
 use crate::style::{Color, Style};
 
-/// The colours of vectors and of what sets them off from what is dark.
+/// The colours of vectors and of their halos, which set them off from dark ground.
 const VECTOR: Color = [0; 3];
 const HALO: Color = [190; 3];
 
 /// The colour behind flow without an image: a middle grey, since edges are white.
 pub(super) const NO_IMAGE: Color = [140; 3];
 
-/// The width in pixels by which barriers and streamlines are set off, on each side.
+/// The width in pixels of the casing of barriers and streamlines, on each side.
 const CASING: f64 = 1.0;
 const CASING_COLOR: Color = [30; 3];
 
@@ -98,7 +98,7 @@ impl<'a> Appearance<'a> {
         }
     }
 
-    /// What the colours stand for.
+    /// The bars of the legend.
     pub fn bars(&self) -> Vec<Bar> {
         let pressure = self.pressure.map(|range| Bar { name: "PRESSURE", map: VIRIDIS, range });
         let time = self.time.map(|range| Bar { name: "TIME", map: PLASMA, range });
@@ -107,14 +107,14 @@ impl<'a> Appearance<'a> {
     }
 }
 
-/// The share of cells at each end of the range of pressures that have its last colour: wells' are extreme.
+/// The share of cells beyond each end of the colours of pressures: those at wells are extreme.
 const PRESSURE_CUT: [f64; 2] = [0.005; 2];
 
-/// The share of points of streamlines that have the last colour: where it hardly flows, time has no end.
+/// The share of points of streamlines beyond the last colour of times: where flow is slow, times are extreme.
 const TIME_CUT: [f64; 2] = [0.0, 0.05];
 
 impl Canvas {
-    /// The shapes, without what lies beneath. `along` is a cell's vector in pixels, if it has one.
+    /// The shapes, without the background. `along` is a cell's vector in pixels, if it has one.
     pub fn shapes(&self, look: &Appearance, along: &dyn Fn(usize) -> Option<Place>) -> Vec<Shape> {
         let mut shapes = Vec::new();
         if let Some(range) = look.pressure {

@@ -1,4 +1,4 @@
-//! All that there is to see of flow, and how it is drawn.
+//! The contents of a picture of flow, and its style.
 
 use atomesh::geometry::Point;
 use atomesh::image::Image;
@@ -7,7 +7,7 @@ use atomesh::voronoi::PolyMesh;
 
 use crate::error::DrawError;
 
-/// The cells on which something flows.
+/// The cells of the flow.
 #[derive(Clone, Copy, Debug)]
 pub enum FlowCells<'a, const D: usize> {
     /// Triangles or tetrahedra; facets are those of [`Mesh::facets`].
@@ -44,16 +44,16 @@ impl<const D: usize> FlowCells<'_, D> {
     }
 }
 
-/// Where something flows into the mesh or out of it.
+/// A well.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct FlowWell<const D: usize> {
     /// The place.
     pub place: Point<D>,
-    /// What it brings in a unit of time; below 0 what it takes. Only the sign is drawn.
+    /// The inflow per unit of time; below 0 outflow. Only the sign is drawn.
     pub rate: f64,
 }
 
-/// A line along which something flows.
+/// A streamline.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct FlowLine<'a, const D: usize> {
     /// The places along it.
@@ -62,28 +62,27 @@ pub struct FlowLine<'a, const D: usize> {
     pub times: &'a [f64],
 }
 
-/// What there is to see of flow on a mesh. Whatever is empty is not drawn.
+/// The contents of a picture of flow on a mesh. Whatever is empty is not drawn.
 ///
-/// Points are in sample coordinates, and velocities are in samples in a unit of time, so that a velocity
-/// is drawn as what it does to a point. Of a velocity in the world, that is the difference between where
-/// [`Frame::world_to_lattice`](atomesh::image::Frame::world_to_lattice) puts two points that it parts.
+/// Points are in sample coordinates, velocities in samples per unit of time. To convert a velocity v of the world, take
+/// f(x + v) − f(x) with f = [`Frame::world_to_lattice`](atomesh::image::Frame::world_to_lattice) in samples.
 #[derive(Clone, Copy, Debug)]
 pub struct FlowPicture<'a, const D: usize> {
     /// The mesh.
     pub cells: FlowCells<'a, D>,
-    /// What lies beneath, in grey. Without one, the picture ends where the mesh does, and samples are squares
+    /// The image behind the mesh, in grey. Without one, the picture ends where the mesh does, and samples are squares
     /// or cubes.
     pub image: Option<&'a Image<D>>,
-    /// The numbers of facets that little or nothing passes: drawn bold.
+    /// The numbers of facets that are barriers, drawn bold.
     pub barriers: &'a [u32],
-    /// A velocity for each cell, drawn where its middle is.
+    /// The velocity of each cell, drawn at its centre.
     pub velocities: &'a [Point<D>],
-    /// A pressure for each cell, drawn as its colour in place of the image, from dark blue by green to yellow
+    /// The pressure of each cell, drawn as its colour in place of the image, from dark blue through green to yellow
     /// at the highest.
     pub pressures: &'a [f64],
     /// Wells: discs with a ring, red where something flows in, blue where it flows out.
     pub wells: &'a [FlowWell<D>],
-    /// Streamlines, coloured by time from violet by red to yellow at the longest.
+    /// Streamlines, coloured by time from violet through red to yellow at the longest.
     pub lines: &'a [FlowLine<'a, D>],
 }
 
@@ -129,20 +128,20 @@ impl<'a, const D: usize> FlowPicture<'a, D> {
     }
 }
 
-/// How flow is drawn, besides [`Style`](crate::Style). The defaults were chosen by looking.
+/// The style of flow, besides [`Style`](crate::Style). The defaults were chosen by eye.
 #[derive(Clone, Debug, PartialEq)]
 pub struct FlowStyle {
     /// The width of barriers in pixels. Default 4.
     pub barrier_width: f64,
-    /// How long the vector of a brisk flow is, faster than nine cells of ten that flow at all, over the typical
-    /// edge. Default 1; shorter ones have lengths in proportion.
+    /// The length of the vector of a brisk flow, the 90th percentile of the cells that flow, relative to the typical
+    /// edge. Default 1; other vectors have lengths in proportion.
     pub vector_length: f64,
-    /// How much longer than that a vector may be: beside wells flow is too fast to be drawn. Default 1.5.
+    /// The longest vector, relative to that of a brisk flow; beside wells flow is faster. Default 1.5.
     pub longest_vector: f64,
-    /// The least distance in pixels between two vectors' middles: of cells nearer to each other the larger ones'
-    /// are drawn. Default 7.
+    /// The least distance in pixels between the middles of two vectors; of nearer cells the largest ones' are drawn.
+    /// Default 7.
     pub vector_spacing: f64,
-    /// Whether bars to the right say what colours stand for. Default true.
+    /// Whether there is a legend of colours to the right. Default true.
     pub legend: bool,
 }
 
@@ -159,7 +158,7 @@ impl Default for FlowStyle {
 }
 
 impl FlowStyle {
-    /// The style, if its numbers have a meaning.
+    /// The style, if its numbers are in range.
     pub(super) fn checked(&self) -> Result<&Self, DrawError> {
         for (name, value, limit) in [
             ("barrier_width", self.barrier_width, Some(100.0)),

@@ -22,8 +22,8 @@ const MARGIN: f64 = 10.0;
 /// Cost: O(pixels + samples + cells log cells).
 ///
 /// # Errors
-/// [`DrawError::Style`] if a number of a style has no meaning; [`DrawError::Count`] if there are not as many
-/// velocities, pressures or times as they are for; [`DrawError::Facet`] if a barrier is no facet.
+/// [`DrawError::Style`] if a number of a style is out of range; [`DrawError::Count`] if the number of velocities,
+/// pressures or times is not that of cells or points; [`DrawError::Facet`] if a barrier is not a facet.
 pub fn draw_flow(
     flow: &FlowPicture<'_, 2>,
     style: &Style,
@@ -56,10 +56,10 @@ pub fn draw_flow(
     Ok(picture)
 }
 
-/// Where points of the mesh are in the picture.
+/// The map from the mesh to the picture.
 struct Layout {
     rect: Rect,
-    /// Pixels to a sample.
+    /// Pixels per sample.
     pixels: Place,
     /// Where sample coordinates 0, 0 are.
     origin: Place,

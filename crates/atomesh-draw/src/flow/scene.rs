@@ -1,6 +1,7 @@
 //! What the panels of a picture of flow in space share: the box, where the slices meet, and the scale.
 
 use atomesh::geometry::{Bounds, Point, difference};
+use atomesh::image::Image;
 
 use super::picture::{FlowCells, FlowPicture};
 use crate::error::DrawError;
@@ -15,10 +16,10 @@ pub(super) struct Scene<'a> {
     pub facets: Vec<Vec<u32>>,
     /// Where the slices meet.
     pub at: Point<3>,
-    /// The least sample coordinates, and how far they go on.
+    /// The box: its least sample coordinates and its extent.
     pub first: Point<3>,
     pub extent: Point<3>,
-    /// Pixels to a sample along each axis.
+    /// Pixels per sample along each axis.
     pub pixels: Point<3>,
     /// The length of a typical edge in pixels.
     pub edge_pixels: f64,
@@ -60,6 +61,12 @@ impl<'a> Scene<'a> {
         Ok(Self { flow, style, facets, at, first, extent, pixels, edge_pixels })
     }
 
+    /// The sample nearest to where the slices meet.
+    pub fn sample(&self, image: &Image<3>) -> [usize; 3] {
+        let shape = image.frame().shape();
+        std::array::from_fn(|k| (self.at[k].round().max(0.0) as usize).min(shape[k] - 1))
+    }
+
     pub fn in_pixels(&self, v: &Point<3>) -> Point<3> {
         std::array::from_fn(|k| v[k] * self.pixels[k])
     }
@@ -69,11 +76,11 @@ impl<'a> Scene<'a> {
     }
 }
 
-/// How much larger cells are drawn than the style says, and their parts in slices smaller than cells: there is a
-/// vector in each part.
+/// The factor by which edges are longer than the style says, so that there is room for a vector in each part of a cell
+/// that a slice shows.
 pub(super) const LARGER: f64 = 1.5;
 
-/// The median length of edges of tetrahedra, or from site to site of Voronoi cells.
+/// The median length of tetrahedra's edges, or distance between neighbouring sites of Voronoi cells.
 fn typical_edge(cells: &FlowCells<3>, step: &Point<3>) -> Option<f64> {
     match cells {
         FlowCells::Simplices(mesh) => typical_length(mesh, step),

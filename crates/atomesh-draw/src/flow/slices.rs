@@ -7,19 +7,20 @@ use super::canvas::{Appearance, Canvas, Mark, NO_IMAGE, Tile};
 use super::picture::{FlowCells, FlowPicture, FlowStyle, FlowWell};
 use super::scene::{LARGER, Scene};
 use super::space::in_space;
-use crate::cut::{CROSS_HAIR, GAP, Level, SLICES, Slice, unique};
+use crate::cut::{Level, unique};
 use crate::error::DrawError;
 use crate::label::label;
 use crate::legend::put_beside;
+use crate::panel::{GAP, Panel};
 use crate::picture::Picture;
 use crate::raster::Ramp;
 use crate::shape::{Place, Rect, Shape};
 use crate::style::Style;
 
-/// Draws flow on tetrahedra or polyhedra in three slices through `at`, a place in sample coordinates; through
-/// the middle of the image, or of the mesh if there is none, where it is `None`. Vectors are velocities as they
-/// are seen along a slice's normal; edges are half as long again as [`Style::edge_pixels`] says. Wells farther from a slice than an edge is long are drawn small. The panel
-/// upper left shows barriers, streamlines and wells in space; the image where there are none.
+/// Draws flow on tetrahedra or polyhedra in three slices through `at`, a place in sample coordinates. `None` is the
+/// middle of the image, or of the mesh without an image. Vectors are velocities projected to the slice; edges are 1.5
+/// times as long as [`Style::edge_pixels`]. Wells farther from a slice than an edge is long are drawn small. The upper
+/// left panel shows barriers, streamlines and wells in space, or the image if there are none.
 ///
 /// Cost: O(pixels + samples of the slices + cells log cells).
 ///
@@ -47,83 +48,58 @@ pub fn draw_flow_slices(
     let corner = Rect { corner: [0.0; 2], size: [sides[1]; 2] };
     picture.shapes.extend(in_space(&scene, &look, corner));
     let ramp = flow.image.map(|image| Ramp::robust(image.samples(), style.brightness));
-    for (slice, [column, row]) in &SLICES {
-        let corner = [*column, *row].map(|step| step as f64 * (sides[1] + GAP));
-        let size = [slice.right, slice.down].map(|k| sides[k]);
-        let panel = Panel { scene: &scene, slice, rect: Rect { corner, size } };
-        picture.shapes.push(panel.background(ramp.as_ref()));
-        let along = |cell: usize| panel.along(cell, share);
-        picture.shapes.extend(panel.canvas().shapes(&look, &along));
-        picture.shapes.push(panel.cross_hair());
-        picture.shapes.extend(label(slice.name, &panel.rect));
+    for panel in Panel::all(scene.first, sides, scene.pixels, style.z_up) {
+        let slice = FlowSlice { scene: &scene, panel };
+        picture.shapes.push(slice.background(ramp.as_ref()));
+        let along = |cell: usize| slice.along(cell, share);
+        picture.shapes.extend(slice.canvas().shapes(&look, &along));
+        picture.shapes.push(panel.cross_hair(&scene.at));
+        picture.shapes.extend(label(panel.slice.name, &panel.rect));
     }
     put_beside(&mut picture, &look.bars());
     Ok(picture)
 }
 
-/// One slice in its place.
-struct Panel<'a> {
+/// One slice of the flow.
+struct FlowSlice<'a> {
     scene: &'a Scene<'a>,
-    slice: &'a Slice,
-    rect: Rect,
+    panel: Panel,
 }
 
-impl Panel<'_> {
-    /// Whether the axis drawn downward is shown from its end.
-    fn flipped(&self) -> bool {
-        self.scene.style.z_up && self.slice.down == 2
-    }
-
-    /// Where a point, seen along the normal, is in the picture.
-    fn place(&self, p: &Point<3>) -> Place {
-        let Scene { first, pixels, .. } = self.scene;
-        let [x, y] = [self.slice.right, self.slice.down].map(|k| (p[k] - first[k]) * pixels[k]);
-        let y = if self.flipped() { self.rect.size[1] - y } else { y };
-        [self.rect.corner[0] + x, self.rect.corner[1] + y]
-    }
-
-    /// A cell's velocity as seen along the normal, in pixels, times `share`.
+impl FlowSlice<'_> {
+    /// A cell's velocity, projected along the normal, in pixels, times `share`.
     fn along(&self, cell: usize, share: f64) -> Option<Place> {
         let v = self.scene.flow.velocities.get(cell).filter(|v| v.iter().all(|x| x.is_finite()))?;
         let v = self.scene.in_pixels(v);
-        let down = if self.flipped() { -share } else { share };
-        Some([v[self.slice.right] * share, v[self.slice.down] * down])
+        let down = if self.panel.is_flipped { -share } else { share };
+        Some([v[self.panel.slice.right] * share, v[self.panel.slice.down] * down])
     }
 
     fn background(&self, ramp: Option<&Ramp>) -> Shape {
-        let rect = self.rect;
-        let (Some(image), Some(ramp), true) =
-            (self.scene.flow.image, ramp, self.scene.flow.pressures.is_empty())
-        else {
-            return Shape::Fill { rect, color: NO_IMAGE };
-        };
-        let Slice { normal, right, down, .. } = *self.slice;
-        let grid = image.frame().grid(self.scene.style.units);
-        let (shape, strides) = (grid.shape, grid.strides());
-        let at = (self.scene.at[normal].round().max(0.0) as usize).min(shape[normal] - 1);
-        let start = at * strides[normal];
-        let raster = ramp.raster(image.samples(), shape[right], shape[down], |i, j| {
-            let j = if self.flipped() { shape[down] - 1 - j } else { j };
-            start + i * strides[right] + j * strides[down]
-        });
-        Shape::upright(raster, rect)
+        let Scene { flow, style, .. } = self.scene;
+        match (flow.image, ramp) {
+            (Some(image), Some(ramp)) if flow.pressures.is_empty() => {
+                self.panel.image(image, self.scene.sample(image), style.units, ramp)
+            }
+            _ => Shape::Fill { rect: self.panel.rect, color: NO_IMAGE },
+        }
     }
 
     fn canvas(&self) -> Canvas {
         let Scene { flow, facets, pixels, edge_pixels, .. } = self.scene;
-        let normal = self.slice.normal;
+        let normal = self.panel.slice.normal;
         let level = self.level();
         let cut = |facet: &Vec<u32>| {
             let ends = level.cut(normal, &self.scene.corners(facet))?;
-            Some(ends.map(|p| self.place(&p)))
+            Some(ends.map(|p| self.panel.place(&p)))
         };
         let mark = |well: &FlowWell<3>| Mark {
-            place: self.place(&well.place),
+            place: self.panel.place(&well.place),
             is_source: well.rate > 0.0,
             is_near: (well.place[normal] - level.value).abs() * pixels[normal] <= *edge_pixels,
         };
         Canvas {
-            rect: self.rect,
+            rect: self.panel.rect,
             tiles: self.tiles(level),
             edges: unique(facets.iter().filter_map(cut)),
             barriers: unique(flow.barriers.iter().filter_map(|&f| cut(&facets[f as usize]))),
@@ -133,7 +109,7 @@ impl Panel<'_> {
     }
 
     fn level(&self) -> Level {
-        let (value, normal) = (self.scene.at[self.slice.normal], self.slice.normal);
+        let (value, normal) = (self.scene.at[self.panel.slice.normal], self.panel.slice.normal);
         let least =
             self.scene.first[normal] + if self.scene.flow.image.is_some() { 0.5 } else { 0.0 };
         Level { value, own_is_above: value > least }
@@ -142,14 +118,14 @@ impl Panel<'_> {
     /// The parts of cells that the slice shows.
     fn tiles(&self, level: Level) -> Vec<Tile> {
         let cut = |faces: &mut dyn Iterator<Item = Vec<Point<3>>>| -> Vec<Place> {
-            let ends = faces.filter_map(|face| level.cut(self.slice.normal, &face)).flatten();
-            around(ends.map(|p| self.place(&p)).collect())
+            let ends = faces.filter_map(|face| level.cut(self.panel.slice.normal, &face)).flatten();
+            around(ends.map(|p| self.panel.place(&p)).collect())
         };
         let polygon = |cell: usize| match self.scene.flow.cells {
             FlowCells::Simplices(mesh) => {
                 let corners: [Point<3>; 4] =
                     [0, 1, 2, 3].map(|k| mesh.points()[mesh.corners()[4 * cell + k] as usize]);
-                let below = corners.map(|p| level.is_below(p[self.slice.normal]));
+                let below = corners.map(|p| level.is_below(p[self.panel.slice.normal]));
                 if below == [below[0]; 4] {
                     return Vec::new(); // as most cells
                 }
@@ -164,18 +140,9 @@ impl Panel<'_> {
             .map(|cell| Tile { cell, polygon: polygon(cell) });
         tiles.filter(|tile| tile.polygon.len() > 2).collect()
     }
-
-    /// Where the other slices pass.
-    fn cross_hair(&self) -> Shape {
-        let Rect { corner, size } = self.rect;
-        let [x, y] = self.place(&self.scene.at);
-        let end = [corner[0] + size[0], corner[1] + size[1]];
-        let lines = vec![[[corner[0], y], [end[0], y]], [[x, corner[1]], [x, end[1]]]];
-        Shape::Lines { lines, width: 1.0, color: CROSS_HAIR }
-    }
 }
 
-/// The corners of a convex polygon, in any order and more than once, in the order around it.
+/// Orders the corners of a convex polygon around it; they may be repeated.
 fn around(mut corners: Vec<Place>) -> Vec<Place> {
     let count = corners.len() as f64;
     let mean: Place = std::array::from_fn(|k| corners.iter().map(|p| p[k]).sum::<f64>() / count);

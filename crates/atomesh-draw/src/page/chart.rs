@@ -18,17 +18,17 @@ pub(super) struct Chart<'a> {
     pub mark: Option<(f64, &'a str)>,
 }
 
-/// The drawing's size, and the room around its bars: left, right, above, below.
+/// The size of the figure, and the room around its bars: left, right, above, below.
 const SIZE: [f64; 2] = [380.0, 190.0];
 const ROOM: [f64; 4] = [8.0, 18.0, 34.0, 34.0];
 
-/// Bars kept beyond the first and the last that hold anything.
+/// Empty classes shown beyond the first and the last that are not empty.
 const BESIDE: usize = 1;
 
 /// Steps of an axis: 1, 2 or 5 times a power of ten.
 const STEPS: [f64; 3] = [1.0, 2.0, 5.0];
 
-/// The classes that are shown, and where they are.
+/// The classes of the histogram that are shown, and their places.
 struct Axis {
     first: usize,
     last: usize,
@@ -84,7 +84,7 @@ impl Chart<'_> {
         out
     }
 
-    /// From the first class that holds anything, or the mark, to the last, and a few beside; `None` if all are empty.
+    /// From the first class that is not empty, or has the mark, to the last, and [`BESIDE`] more; `None` if all are empty.
     fn axis(&self) -> Option<Axis> {
         let counts = &self.histogram.counts;
         let first = counts.iter().position(|&c| c > 0)?;
@@ -103,7 +103,7 @@ impl Chart<'_> {
             if count == 0 {
                 continue;
             }
-            // a bar with anything in it is seen
+            // no bar of a class that is not empty is invisible
             let tall = ((BOTTOM - ROOM[2]) * count as f64 / most as f64).max(1.0);
             let share = 100.0 * count as f64 / total as f64;
             let from = number(i as f64 * axis.class);

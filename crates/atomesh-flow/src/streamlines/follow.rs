@@ -4,7 +4,7 @@ use atomesh::geometry::Point;
 
 use super::line::{End, Streamline};
 use super::options::{Porosity, TraceOptions};
-use super::pieces::{Beyond, FluxField, Piece};
+use super::pieces::{FluxField, Neighbour, Piece};
 use super::simplex::{Corners, exit};
 use super::starts::Start;
 use super::wells::WellExchange;
@@ -104,7 +104,7 @@ impl<'a, const D: usize> Tracer<'a, D> {
     ) -> Result<u32, End> {
         let pieces = self.field.pieces(cell as usize);
         let holds = |piece: &Piece<D>| {
-            piece.beyond.contains(&Beyond::Facet(facet)) && at.is_in(&piece.numbers[..=D])
+            piece.beyond.contains(&Neighbour::Facet(facet)) && at.is_in(&piece.numbers[..=D])
         };
         let mut own = pieces.iter().position(holds).ok_or(End::Stagnation)?;
         for _ in 0..STILL {
@@ -118,9 +118,9 @@ impl<'a, const D: usize> Tracer<'a, D> {
             push(line, piece.place(&exit.weights), time, cell);
             *at = At { numbers: piece.numbers, weights: exit.weights };
             match piece.beyond[exit.opposite] {
-                Beyond::Facet(facet) => return Ok(facet),
-                Beyond::Piece(next) => own = next as usize,
-                Beyond::Nothing => return Err(End::Stagnation),
+                Neighbour::Facet(facet) => return Ok(facet),
+                Neighbour::Piece(next) => own = next as usize,
+                Neighbour::Nothing => return Err(End::Stagnation),
             }
         }
         Err(End::Stagnation)

@@ -71,13 +71,13 @@ impl<'a, const D: usize> FluxField<'a, D> {
         let measure = self.grid.measures()[cell];
         let simplex = mesh.simplex(corners);
         let mut piece =
-            Piece { simplex, numbers, measure, fluxes: [0.0; 4], beyond: [Beyond::Nothing; 4] };
+            Piece { simplex, numbers, measure, fluxes: [0.0; 4], beyond: [Neighbour::Nothing; 4] };
         for &facet in self.grid.facets_of(cell) {
             let own = self.grid.facet_corners(facet as usize).expect("facets of a mesh");
             let opposite = corners.iter().position(|corner| !own.contains(corner));
             if let Some(opposite) = opposite {
                 piece.fluxes[opposite] = self.out_of(cell, facet as usize);
-                piece.beyond[opposite] = Beyond::Facet(facet);
+                piece.beyond[opposite] = Neighbour::Facet(facet);
             }
         }
         piece
@@ -95,8 +95,8 @@ impl<'a, const D: usize> FluxField<'a, D> {
                 let mut numbers = [CENTROID; 4];
                 numbers[1..=D].copy_from_slice(&corners);
                 let measure = (sign * simplex.measure()).max(0.0);
-                let mut beyond = [Beyond::Nothing; 4];
-                beyond[0] = Beyond::Facet(face as u32);
+                let mut beyond = [Neighbour::Nothing; 4];
+                beyond[0] = Neighbour::Facet(face as u32);
                 pieces.push(Piece { simplex, numbers, measure, fluxes: [0.0; 4], beyond });
                 signs.push(sign);
             }
@@ -144,8 +144,8 @@ impl<'a, const D: usize> FluxField<'a, D> {
             let flux = if flux.abs() > self.least && flux.is_finite() { flux } else { 0.0 };
             *own = flux;
             pieces[b].fluxes[link.opposite[1]] = -flux;
-            pieces[a].beyond[link.opposite[0]] = Beyond::Piece(b as u32);
-            pieces[b].beyond[link.opposite[1]] = Beyond::Piece(a as u32);
+            pieces[a].beyond[link.opposite[0]] = Neighbour::Piece(b as u32);
+            pieces[b].beyond[link.opposite[1]] = Neighbour::Piece(a as u32);
         }
     }
 
@@ -164,7 +164,7 @@ impl<'a, const D: usize> FluxField<'a, D> {
 
 /// What lies beyond a facet of a piece.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum Beyond {
+pub enum Neighbour {
     /// Unknown.
     Nothing,
     /// A facet of the grid.
@@ -184,7 +184,7 @@ pub struct Piece<const D: usize> {
     /// The flux out of the facet opposite each corner.
     pub fluxes: Corners,
     /// What lies beyond the facet opposite each corner.
-    pub beyond: [Beyond; 4],
+    pub beyond: [Neighbour; 4],
 }
 
 impl<const D: usize> Piece<D> {

@@ -7,7 +7,7 @@ use atomesh::voronoi::{PolyMesh, voronoi};
 use atomesh::watch::Silent;
 use proptest::prelude::*;
 
-use super::pieces::Beyond;
+use super::pieces::Neighbour;
 use super::*;
 use crate::problem::{Barrier, Boundary, Condition, Control, Problem, Value, Well};
 use crate::solve::{SolveOptions, SolveReport};
@@ -255,12 +255,13 @@ fn inner_fluxes_balance<const D: usize>(delaunay: Delaunay<D>, steps: usize) {
             // rates are 1
             assert!((sum - net * piece.measure / measure).abs() < 1e-13, "{piece:?}");
             for corner in 0..=D {
-                if let Beyond::Piece(other) = piece.beyond[corner] {
+                if let Neighbour::Piece(other) = piece.beyond[corner] {
                     let other = &pieces[other as usize];
-                    let back = other.beyond.iter().position(|b| *b == Beyond::Piece(number as u32));
+                    let back =
+                        other.beyond.iter().position(|b| *b == Neighbour::Piece(number as u32));
                     assert_eq!(other.fluxes[back.unwrap()], -piece.fluxes[corner]);
                 } else {
-                    assert!(matches!(piece.beyond[corner], Beyond::Facet(_)));
+                    assert!(matches!(piece.beyond[corner], Neighbour::Facet(_)));
                 }
             }
         }

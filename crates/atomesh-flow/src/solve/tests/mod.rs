@@ -1,3 +1,8 @@
+//! Every way to solve gives the right answer or an error.
+
+mod order;
+mod sparse;
+
 use std::ops::ControlFlow;
 
 use atomesh::geometry::Point;
@@ -198,59 +203,6 @@ proptest! {
             }
         }
     }
-
-    #[test]
-    fn each_unknown_is_eliminated_once_and_blocks_stay_together(
-        count in 0_usize..300, block in 1_usize..4, seed: u64, coincide: bool,
-    ) {
-        let mut own = dominant(count, block, seed, false);
-        if coincide {
-            own.places.iter_mut().for_each(|place| place[1] = place[0].round());
-        }
-        let order = Elimination::new(&own.matrix, block, &own.places, false, f64::INFINITY).order;
-        let mut sorted = order.clone();
-        sorted.sort_unstable();
-        prop_assert_eq!(sorted, (0..(count * block) as u32).collect::<Vec<_>>());
-        for unknowns in order.chunks(block) {
-            prop_assert!(unknowns.iter().all(|u| u / block as u32 == unknowns[0] / block as u32));
-        }
-    }
-
-    #[test]
-    fn the_values_of_a_factor_are_counted_as_elimination_makes_them(
-        count in 1_usize..40, seed: u64,
-    ) {
-        let own = dominant(count, 1, seed, true);
-        let plan = Elimination::new(&own.matrix, 1, &own.places, false, f64::INFINITY);
-        let mut full = vec![vec![false; count]; count];
-        own.matrix.entries().for_each(|(i, j, _)| full[i][j] = true);
-        let mut expected = (0.0, 0.0);
-        for (at, &pivot) in plan.order.iter().enumerate() {
-            let rest = &plan.order[at..];
-            let column: Vec<usize> =
-                rest.iter().map(|&u| u as usize).filter(|&u| full[u][pivot as usize]).collect();
-            expected.0 += column.len() as f64;
-            expected.1 += (column.len() as f64).powi(2);
-            for &i in &column {
-                column.iter().for_each(|&j| full[i][j] = true);
-            }
-        }
-        prop_assert_eq!((plan.values, plan.work), expected);
-        let short = Elimination::new(&own.matrix, 1, &own.places, false, expected.0 - 1.0);
-        prop_assert_eq!(short.values, f64::INFINITY);
-    }
-}
-
-#[test]
-fn dissection_fills_less_than_rows_one_after_another() {
-    let own = cubes::<2>(60, |_| 1.0);
-    let plan = Elimination::new(&own.matrix, 1, &own.places, false, f64::INFINITY);
-    // by rows a factor holds a band of 60; by dissection some 31/8 log₂ n² of them (George 1973), n = 60: 46, less
-    // the leaves
-    assert!(plan.values < 30.0 * 3600.0, "{}", plan.values / 3600.0);
-    let along = vec![[0.0]; 3600];
-    let bad = Elimination::new(&own.matrix, 1, &along, false, f64::INFINITY);
-    assert!(plan.values < bad.values, "places matter");
 }
 
 #[test]
@@ -452,54 +404,4 @@ fn iteration_that_may_not_end_is_an_error() {
     let options = SolveOptions { method: SolveMethod::Iterative, limit: 2, ..Default::default() };
     let error = solve(&own.system(true), &options, &mut Silent).map(|found| found.1).unwrap_err();
     assert!(matches!(error, SolveError::NotConverged { iterations: 2, .. }), "{error}");
-}
-
-/// A matrix as rows of numbers.
-fn dense(matrix: &Sparse) -> Vec<Vec<f64>> {
-    let mut rows = vec![vec![0.0; matrix.column_count()]; matrix.row_count()];
-    matrix.entries().for_each(|(i, j, v)| rows[i][j] += v);
-    rows
-}
-
-proptest! {
-    #[test]
-    fn products_are_those_of_dense_matrices(
-        a in prop::collection::vec((0_u32..7, 0_u32..5, -3_i8..4), 0..40),
-        b in prop::collection::vec((0_u32..5, 0_u32..6, -3_i8..4), 0..40),
-    ) {
-        let entry = |&(i, j, v): &(u32, u32, i8)| (i, j, f64::from(v));
-        let entries: Vec<_> = a.iter().map(entry).collect();
-        let (a, b) = (
-            Sparse::from_entries(7, 5, &entries),
-            Sparse::from_entries(5, 6, &b.iter().map(entry).collect::<Vec<_>>()),
-        );
-        let mut sums = vec![vec![0.0; 5]; 7];
-        entries.iter().for_each(|&(i, j, v)| sums[i as usize][j as usize] += v);
-        let (left, right, product) = (dense(&a), dense(&b), dense(&a.product(&b)));
-        // whole numbers: no rounding anywhere
-        prop_assert_eq!(&left, &sums);
-        let (turned, x) = (dense(&a.transpose()), [1.0, -2.0, 3.0, 0.5, 4.0]);
-        let mut y = vec![0.0; 7];
-        a.multiply(&x, &mut y);
-        for i in 0..7 {
-            prop_assert_eq!(y[i], (0..5).map(|j| left[i][j] * x[j]).sum::<f64>());
-            for j in 0..5 {
-                prop_assert_eq!(turned[j][i], left[i][j]);
-            }
-            for j in 0..6 {
-                let sum: f64 = (0..5).map(|k| left[i][k] * right[k][j]).sum();
-                prop_assert_eq!(product[i][j], sum);
-            }
-        }
-        let again = Sparse::new(5, a.starts().to_vec(), a.columns().to_vec(), a.values().to_vec());
-        prop_assert_eq!(again, a);
-    }
-}
-
-#[test]
-fn symmetry_is_of_values_and_places() {
-    let of = |entries: &[(u32, u32, f64)]| Sparse::from_entries(2, 2, entries);
-    assert!(of(&[(0, 0, 1.0), (1, 1, 1.0), (0, 1, 0.5), (1, 0, 0.5)]).is_symmetric(0.0));
-    assert!(!of(&[(0, 0, 1.0), (1, 1, 1.0), (0, 1, 0.5), (1, 0, 0.4)]).is_symmetric(0.05));
-    assert!(!of(&[(0, 0, 1.0), (0, 1, 0.5)]).is_symmetric(1.0));
 }
