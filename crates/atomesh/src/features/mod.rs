@@ -11,6 +11,7 @@
 //! count.
 
 mod clean;
+mod faces;
 mod field;
 mod orient;
 mod ridges;
@@ -18,9 +19,10 @@ mod ridges;
 mod tests;
 
 use crate::geometry::{Bounds, dot};
-use crate::mesh::{FacetGroup, Mesh, Regions, Tags, TagsError};
+use crate::mesh::{FacetGroup, Mesh, Regions, Tags, TagsError, feature_name};
 use crate::region::{components, islands};
 use crate::watch::Cancelled;
+pub use faces::{FeatureFaces, feature_faces};
 pub use field::FacetField;
 use orient::Piece;
 use ridges::Ridges;
@@ -211,22 +213,12 @@ fn feature<const D: usize>(
     (measure, feature)
 }
 
-/// Whether a group of facets has a name that [`FeatureSet::name`] gives.
-pub fn is_feature_name(name: &str) -> bool {
-    name.strip_prefix("feature-").is_some_and(|number| number.parse::<u32>().is_ok())
-}
-
 impl<const D: usize> FeatureSet<D> {
-    /// The name of the feature with that place in the list.
-    pub fn name(index: usize) -> String {
-        format!("feature-{}", index + 1)
-    }
-
     /// The features as groups of facets, numbered from 1 and named `feature-1`, `feature-2` …
     pub fn groups(&self) -> Vec<FacetGroup<D>> {
         let group = |(index, feature): (usize, &Feature<D>)| FacetGroup {
             id: index as u32 + 1,
-            name: Self::name(index),
+            name: feature_name(index as u32 + 1),
             facets: feature.facets.clone(),
         };
         self.features.iter().enumerate().map(group).collect()
@@ -266,7 +258,7 @@ impl<const D: usize> FeatureSet<D> {
             let side = |of: fn(Bounds<D>) -> [f64; D]| bounds.map_or(vec![], |b| of(b).to_vec());
             FeatureReport {
                 id: index as u32 + 1,
-                name: Self::name(index),
+                name: feature_name(index as u32 + 1),
                 facets: feature.facets.len(),
                 measure: feature.facets.iter().map(|facet| measure_of(mesh, facet)).sum(),
                 mean: feature.mean,

@@ -51,20 +51,7 @@ impl<const D: usize> Mesh<D> {
     /// # Panics
     /// If a corner is no point of the mesh.
     pub fn facet_normal(&self, facet: &[u32; D]) -> Point<D> {
-        const { assert!(D == 2 || D == 3) };
-        let at = |k: usize| &self.points[facet[k] as usize];
-        let mut normal = [0.0; D];
-        if D == 2 {
-            let v = difference(at(1), at(0));
-            (normal[0], normal[1]) = (v[1], -v[0]);
-        } else {
-            let (u, v) = (difference(at(1), at(0)), difference(at(2), at(0)));
-            for k in 0..D {
-                let (i, j) = ((k + 1) % D, (k + 2) % D);
-                normal[k] = (u[i] * v[j] - u[j] * v[i]) / 2.0;
-            }
-        }
-        normal
+        area_vector(&facet.map(|corner| self.points[corner as usize]))
     }
 
     /// Calls `visit` with the cells beside each facet, ascending, facet after facet in lexicographic
@@ -147,6 +134,21 @@ impl CellsOfPoints {
             _ => &[],
         }
     }
+}
+
+/// The normal of a segment or triangle, as long as the segment is long or the triangle large: to the right of a
+/// segment from its first point to its second, on the side from which a triangle's points run counter-clockwise.
+pub(crate) fn area_vector<const D: usize>(corners: &[Point<D>; D]) -> Point<D> {
+    const { assert!(D == 2 || D == 3) };
+    let u = difference(&corners[1], &corners[0]);
+    if D == 2 {
+        return std::array::from_fn(|k| if k == 0 { u[1] } else { -u[0] });
+    }
+    let v = difference(&corners[D - 1], &corners[0]);
+    std::array::from_fn(|k| {
+        let (a, b) = ((k + 1) % D, (k + 2) % D);
+        0.5 * (u[a] * v[b] - u[b] * v[a])
+    })
 }
 
 #[cfg(test)]

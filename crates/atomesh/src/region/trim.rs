@@ -9,7 +9,7 @@
 use rayon::prelude::*;
 
 use crate::geometry::{Bounds, Point, distance_squared};
-use crate::mesh::Mesh;
+use crate::mesh::{Mesh, sides_of};
 use crate::watch::{Phase, Watch, check};
 
 use super::carve::Carving;
@@ -98,8 +98,8 @@ fn centroid<const D: usize>(mesh: &Mesh<D>, cell: &[u32]) -> Point<D> {
 
 /// Whether points lie on one side of the box.
 fn is_on_side<const D: usize>(mesh: &Mesh<D>, points: &[u32], bounds: &Bounds<D>) -> bool {
-    let all_at = |k: usize, side: f64| points.iter().all(|&c| mesh.points()[c as usize][k] == side);
-    (0..D).any(|k| all_at(k, bounds.min[k]) || all_at(k, bounds.max[k]))
+    let sides = points.iter().map(|&c| sides_of(&mesh.points()[c as usize], bounds, 0.0));
+    sides.fold(!0, |shared, sides| shared & sides) != 0
 }
 
 fn has_facet_on_side<const D: usize>(mesh: &Mesh<D>, cell: &[u32], bounds: &Bounds<D>) -> bool {

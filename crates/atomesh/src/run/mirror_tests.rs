@@ -40,7 +40,7 @@ fn options<const D: usize>(d: f64) -> MeshOptions<D> {
 fn assert_sound<const D: usize>(outcome: &Outcome<D>, cells: &PolyMesh<D>) {
     cells.validate(&outcome.potential().grid().bounds()).unwrap();
     for (&a, &b) in cells.owners().iter().zip(cells.neighbours()) {
-        let [p, q] = [a, b].map(|cell| cells.sites()[cell as usize]);
+        let [p, q] = [a, b].map(|cell| cells.centers()[cell as usize]);
         let d = outcome.distance().at(&p).min(outcome.distance().at(&q));
         let gap = distance_squared(&p, &q).sqrt() / d;
         assert!(gap >= 0.4, "{p:?} and {q:?} are {gap} d apart");
@@ -201,7 +201,7 @@ fn without_features_nothing_changes() {
         let (outcome, with) = cells(&Method::flat(), &b, options(6.0));
         let plain = MeshOptions { mirror: false, ..options(6.0) };
         let (_, without) = cells(&Method::flat(), &b, plain);
-        assert_eq!(with.sites(), without.sites());
+        assert_eq!(with.centers(), without.centers());
         assert_eq!(outcome.mirror_report(), None);
     }
 }
@@ -226,7 +226,7 @@ fn a_well_stays_beside_and_on_a_feature() {
         let seed_points = vec![well];
         let given = MeshOptions { seed_points, ..options(6.0) };
         let (outcome, cells) = cells(&Method::flat(), &b, given);
-        assert!(cells.sites().contains(&well), "{well:?}");
+        assert!(cells.centers().contains(&well), "{well:?}");
         assert_sound(&outcome, &cells);
     }
 }
@@ -240,6 +240,6 @@ fn sites_do_not_depend_on_the_number_of_threads() {
         pool.install(|| cells(&Method::volume(), &b, options(5.0)).1)
     };
     let (one, two) = (run(1), run(2));
-    assert_eq!(one.sites(), two.sites());
+    assert_eq!(one.centers(), two.centers());
     assert_eq!(one.points(), two.points());
 }

@@ -45,14 +45,14 @@ use crate::improve::{Align, ImproveReport};
 use crate::lattice::{
     GrowOptions, Lattice, Outlined, Place, ScatterOptions, fill_holes, grow_within, scatter, settle,
 };
-use crate::mesh::{Mesh, merge_duplicates};
+use crate::mesh::{Mesh, PolyMesh, merge_duplicates};
 use crate::mirror::{MirrorReport, Mirrored, crests, mirror};
 use crate::optimize::{EngineKind, OptimizeReport, optimize};
 use crate::region::{
     Outline, RegionError, Trimmed, fit, islands, label_samples, outline_facets, smooth, trim,
 };
 use crate::sample::{SampleOptions, Statistic, sample_placed};
-use crate::voronoi::{PolyMesh, sites_apart, voronoi};
+use crate::voronoi::{sites_apart, voronoi};
 use crate::watch::{Phase, Watch, check};
 use rayon::prelude::*;
 

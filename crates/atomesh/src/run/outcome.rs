@@ -1,6 +1,8 @@
 //! What a run gives.
 
-use crate::features::{FacetField, FeatureFacetOptions, FeatureSet, find_features};
+use crate::features::{
+    FacetField, FeatureFaces, FeatureFacetOptions, FeatureSet, feature_faces, find_features,
+};
 use crate::fields::ScalarField;
 use crate::fields::{NominalDistance, feature_density};
 use crate::geometry::{Bounds, Point};
@@ -11,11 +13,10 @@ use crate::measure::{
     MeasureError, ShapeReport, SpreadReport, WantedSize, alignment, alignment_of_faces, features,
     fidelity, precision, shape, spread,
 };
-use crate::mesh::{FacetGroup, Mesh, Quadratic, Regions, Tags, TagsError};
+use crate::mesh::{FacetGroup, Mesh, PolyMesh, PolyReport, Quadratic, Regions, Tags, TagsError};
 use crate::mirror::MirrorReport;
 use crate::optimize::OptimizeReport;
 use crate::region::{Outline, interfaces};
-use crate::voronoi::{FeatureFaces, PolyMesh, PolyReport, feature_faces};
 use crate::watch::Watch;
 use rayon::prelude::*;
 

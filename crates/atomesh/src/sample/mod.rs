@@ -11,6 +11,7 @@
 //! part of it has. In this order, for each cell by itself, cells side by side: overlaps, sums, statistics. The
 //! same result at any thread count. Cost: O(samples in the bounds of the cells).
 
+mod cells;
 mod clip;
 mod overlap;
 mod statistic;
@@ -20,8 +21,8 @@ mod tests;
 
 use crate::geometry::Point;
 use crate::image::{Frame, Image, Samples, Units};
-use crate::mesh::Mesh;
 use crate::watch::{Cancelled, Phase, Watch, check};
+pub use cells::CellSurfaces;
 use clip::Axis;
 use overlap::{Overlaps, Surface};
 use rayon::prelude::*;
@@ -81,37 +82,6 @@ pub enum SampleError {
     Cancelled(#[from] Cancelled),
 }
 
-/// Cells as closed surfaces: whatever has flat facets can be sampled, simplices and convex polyhedra alike.
-pub trait Cells<const D: usize>: Sync {
-    /// How many cells there are.
-    fn cell_count(&self) -> usize;
-
-    /// Calls `visit` with the corners of each facet of a cell, a convex polygon (3-D) or an edge (2-D). In 3-D
-    /// they follow each other counter-clockwise as seen from outside, in 2-D the cell lies to the left; all
-    /// facets of a cell may go the other way round.
-    fn visit_facets(&self, cell: usize, visit: &mut dyn FnMut(&[Point<D>]));
-}
-
-impl<const D: usize> Cells<D> for Mesh<D> {
-    fn cell_count(&self) -> usize {
-        Self::cell_count(self)
-    }
-
-    fn visit_facets(&self, cell: usize, visit: &mut dyn FnMut(&[Point<D>])) {
-        let corners = &self.corners()[cell * (D + 1)..(cell + 1) * (D + 1)];
-        for opposite in 0..=D {
-            // leaving out corner k from an even permutation turns the rest by (−1)^k
-            let mut facet: [Point<D>; D] = std::array::from_fn(|k| {
-                self.points()[corners[k + usize::from(k >= opposite)] as usize]
-            });
-            if opposite % 2 == 1 {
-                facet.swap(D - 2, D - 1);
-            }
-            visit(&facet);
-        }
-    }
-}
-
 /// How cells are sampled.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct SampleOptions<'a> {
@@ -151,7 +121,7 @@ impl CellProperties {
 /// # Errors
 /// As [`sample_placed`].
 pub fn sample<const D: usize>(
-    cells: &impl Cells<D>,
+    cells: &impl CellSurfaces<D>,
     image: &Image<D>,
     options: SampleOptions<'_>,
     watch: &mut dyn Watch,
@@ -166,7 +136,7 @@ pub fn sample<const D: usize>(
 /// [`SampleError`] if the image has one sample along an axis or another number of samples than the frame, a
 /// mean or majority is not defined for the samples, or the watch ends the work.
 pub fn sample_placed<const D: usize>(
-    cells: &impl Cells<D>,
+    cells: &impl CellSurfaces<D>,
     (frame, samples): (&Frame<D>, &Samples),
     options: SampleOptions<'_>,
     watch: &mut dyn Watch,
@@ -268,7 +238,7 @@ struct Sampler<'a, const D: usize, C> {
     unit: f64,
 }
 
-impl<const D: usize, C: Cells<D>> Sampler<'_, D, C> {
+impl<const D: usize, C: CellSurfaces<D>> Sampler<'_, D, C> {
     fn cell(&self, cell: usize, room: &mut Room) -> Found {
         let Room { surface, overlaps, tally } = room;
         surface.clear();

@@ -2,7 +2,7 @@
 
 use super::*;
 use crate::geometry::{Bounds, Simplex, difference};
-use crate::mesh::Delaunay;
+use crate::mesh::{Delaunay, Mesh};
 use crate::watch::Silent;
 use proptest::prelude::*;
 use std::ops::ControlFlow;
@@ -220,7 +220,7 @@ fn the_mean_of_a_linear_image_is_the_value_at_the_centroid() {
 /// A box as a cell: six facets, which simplices have not.
 struct Box3(Bounds<3>);
 
-impl Cells<3> for Box3 {
+impl CellSurfaces<3> for Box3 {
     fn cell_count(&self) -> usize {
         1
     }

@@ -25,25 +25,13 @@
 //! the box itself. Cost: that of connecting the sites, and about as much again; the same at any thread count.
 
 mod clip;
-mod connections;
 mod dual;
-mod marks;
-mod poly_mesh;
-mod report;
-mod sampled;
-mod tidy;
-mod validate;
 #[cfg(test)]
 mod tests;
-
-pub use connections::{BoundaryConnection, Connection, boundary_connections, connections};
-pub use marks::{FeatureFaces, feature_faces};
-pub use poly_mesh::{PolyMesh, side_name};
-pub use report::PolyReport;
-pub use validate::PolyFault;
+mod weld;
 
 use crate::geometry::{Bounds, Point, distance_squared};
-use crate::mesh::{ConnectError, Delaunay, Mesh};
+use crate::mesh::{ConnectError, Delaunay, Mesh, PolyFault, PolyMesh, mean_distance};
 use crate::watch::{Cancelled, Phase, Watch, check};
 
 /// The tolerance as a share of the mean distance of sites.
@@ -141,9 +129,7 @@ pub fn voronoi<const D: usize>(
     check(watch, Phase::Connect, 1.0, None)?;
     let cut = clip::clip(dual, &place);
     check(watch, Phase::Connect, 1.0, None)?;
-    let mesh = tidy::tidy(cut, sites, &place)?;
-    mesh.check_cells()?;
-    Ok(mesh)
+    Ok(weld::weld(cut, sites, &place)?)
 }
 
 /// The points of a Delaunay mesh that are fit for sites in a box: of two nearer to each other than
@@ -164,11 +150,6 @@ pub fn sites_apart<const D: usize>(mesh: &Mesh<D>, bounds: &Bounds<D>) -> Vec<Po
         }
     }
     points.iter().zip(is_site).filter(|(_, is_site)| *is_site).map(|(p, _)| *p).collect()
-}
-
-/// (V/n)^(1/D), the mean distance of n sites.
-pub(crate) fn mean_distance<const D: usize>(bounds: &Bounds<D>, count: usize) -> f64 {
-    (bounds.measure() / count as f64).powf(1.0 / D as f64)
 }
 
 fn check_sites<const D: usize>(sites: &[Point<D>], bounds: &Bounds<D>) -> Result<(), VoronoiError> {

@@ -2,9 +2,9 @@
 
 use rayon::prelude::*;
 
-use super::poly_mesh::PolyMesh;
 use crate::fields::ScalarField;
 use crate::geometry::{Point, Sets, difference, dot};
+use crate::mesh::{PolyMesh, area_vector};
 
 /// Faces that one task looks at.
 const BLOCK: usize = 1 << 10;
@@ -116,7 +116,7 @@ fn is_along<const D: usize>(
     step: f64,
 ) -> bool {
     let [owner, neighbour] =
-        [mesh.owners()[face], mesh.neighbours()[face]].map(|cell| mesh.sites()[cell as usize]);
+        [mesh.owners()[face], mesh.neighbours()[face]].map(|cell| mesh.centers()[cell as usize]);
     let half = difference(&neighbour, &owner).map(|x| 0.5 * x);
     let moved = |way: Point<D>| self::strength(mesh, potential, face, way, step);
     0.5 * (moved(half) + moved(half.map(|x| -x))) <= FALL * strength
@@ -131,9 +131,9 @@ fn strength<const D: usize>(
     step: f64,
 ) -> f64 {
     let (mut sum, mut total) = (0.0, 0.0);
-    for mut simplex in mesh.simplices(face) {
+    for mut simplex in mesh.face_simplices(face) {
         simplex.iter_mut().flatten().zip(way.iter().cycle()).for_each(|(x, w)| *x += w);
-        let part = super::poly_mesh::area_vector(&simplex);
+        let part = area_vector(&simplex);
         let area = dot(&part, &part).sqrt();
         sum += area * mean(potential, &simplex, step);
         total += area;

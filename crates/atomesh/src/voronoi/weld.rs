@@ -4,9 +4,8 @@ use rayon::prelude::*;
 
 use super::clip::{Cut, of_side, side_of};
 use super::dual::{NONE, Place};
-use super::poly_mesh::{Parts, PolyMesh};
-use super::validate::PolyFault;
 use crate::geometry::{Point, Sets, distance_squared};
+use crate::mesh::{PolyFault, PolyMesh, PolyParts};
 
 /// Loops that one task looks at.
 const BLOCK: usize = 1 << 12;
@@ -33,7 +32,7 @@ impl Faces {
     }
 }
 
-pub(super) fn tidy<const D: usize>(
+pub(super) fn weld<const D: usize>(
     cut: Cut<D>,
     sites: &[Point<D>],
     place: &Place<D>,
@@ -189,7 +188,7 @@ fn number<const D: usize>(
         None => (0, face.cells[0], face.cells[1]),
     };
     faces.par_sort_by_key(key);
-    let mut parts = Parts { sites: sites.to_vec(), ..Parts::default() };
+    let mut parts = PolyParts { sites: Some(sites.to_vec()), ..PolyParts::default() };
     let mut new_number = vec![NONE; points.len()];
     for face in &faces {
         for &corner in &corners[face.start..face.end] {
@@ -208,5 +207,5 @@ fn number<const D: usize>(
             None => return Err(PolyFault::Open { cell: face.cells[0] as usize }),
         }
     }
-    Ok(PolyMesh::new(parts))
+    PolyMesh::new(parts)
 }
