@@ -1,4 +1,5 @@
-//! Triangle and tetrahedral meshes, and how points are connected to make them.
+//! Meshes: of triangles or tetrahedra ([`Mesh`]), of their second order ([`Quadratic`]), of polygons or polyhedra
+//! ([`PolyMesh`]), with named groups of facets and cells ([`Tags`]). [`Delaunay`] connects points to make them.
 
 mod delaunay;
 mod facets;
@@ -26,7 +27,7 @@ pub use tags::{
 };
 pub use validate::MeshFault;
 
-/// What is wrong with a mesh's parts.
+/// Why points and corners do not make a mesh.
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]
 #[non_exhaustive]
 pub enum MeshError {
@@ -120,7 +121,7 @@ impl<const D: usize> Mesh<D> {
     /// A cell, given as its corners, with the coordinates of its points.
     ///
     /// # Panics
-    /// If `cell` has other than `D + 1` corners, or names points that the mesh has not.
+    /// If `cell` has other than `D + 1` corners, or names a point that does not exist.
     pub fn simplex(&self, cell: &[u32]) -> Simplex<D> {
         assert_eq!(cell.len(), Self::CORNERS, "a cell has D + 1 corners");
         let at = |k: usize| self.points[cell[k] as usize];

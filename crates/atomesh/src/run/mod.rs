@@ -49,7 +49,8 @@ use crate::mesh::{Mesh, PolyMesh, merge_duplicates};
 use crate::mirror::{MirrorReport, Mirrored, crests, mirror};
 use crate::optimize::{EngineKind, OptimizeReport, optimize};
 use crate::region::{
-    Outline, RegionError, Trimmed, fit, islands, label_samples, outline_facets, smooth, trim,
+    Outline, RegionError, Trimmed, fit_facets, join_islands, label_samples, outline_facets,
+    smooth_outline, trim_to_outline,
 };
 use crate::sample::{SampleOptions, Statistic, sample_placed};
 use crate::voronoi::{sites_apart, voronoi};
@@ -405,9 +406,9 @@ impl<const D: usize> Prepared<'_, D> {
         let (outlined, mesh) =
             outlined.connect(self.method.delaunay(), outline, &self.distance, watch)?;
         let freedom = outlined.lattice().freedom();
-        let trimmed = trim(mesh, (outlined.on_outline(), &freedom), outline, watch)?;
+        let trimmed = trim_to_outline(mesh, outlined.on_outline(), &freedom, outline, watch)?;
         drop(outlined);
-        let mut trimmed = fit(smooth(trimmed, outline, watch)?, outline)?;
+        let mut trimmed = fit_facets(smooth_outline(trimmed, outline, watch)?, outline)?;
         for &point in trimmed.facets.as_flattened() {
             trimmed.freedom[point as usize] = 0;
         }
@@ -425,9 +426,9 @@ impl<const D: usize> Prepared<'_, D> {
         let frame = frame.expect("a grid has samples and steps above 0");
         let samples = Samples::I32(samples.to_vec());
         let options = SampleOptions::new(&[Statistic::Majority]);
-        let found = sample_placed(mesh, (&frame, &samples), options, watch)?;
+        let found = sample_placed(mesh, &frame, &samples, options, watch)?;
         let mut labels: Vec<i32> = found.values[0].iter().map(|&label| label as i32).collect();
-        islands(mesh, &mut labels, self.options.least_island);
+        join_islands(mesh, &mut labels, self.options.least_island);
         Ok(labels)
     }
 

@@ -13,7 +13,10 @@ use crate::measure::{
     MeasureError, ShapeReport, SpreadReport, WantedSize, alignment, alignment_of_faces, features,
     fidelity, precision, shape, spread,
 };
-use crate::mesh::{FacetGroup, Mesh, PolyMesh, PolyReport, Quadratic, Regions, Tags, TagsError};
+use crate::mesh::{
+    FacetGroup, MASK_NAME, Mesh, PolyMesh, PolyReport, Quadratic, Regions, Tags, TagsError,
+    interface_name,
+};
 use crate::mirror::MirrorReport;
 use crate::optimize::OptimizeReport;
 use crate::region::{Outline, interfaces};
@@ -258,10 +261,10 @@ impl<const D: usize> Outcome<D> {
             groups.push(FacetGroup { id, name, facets });
         };
         if self.outline.is_some() {
-            add("mask".into(), self.outline_facets.clone());
+            add(MASK_NAME.into(), self.outline_facets.clone());
         }
-        for ([low, high], facets) in self.labels.iter().flat_map(|l| interfaces(&self.mesh, l)) {
-            add(format!("interface-{low}-{high}"), facets);
+        for interface in self.labels.iter().flat_map(|l| interfaces(&self.mesh, l)) {
+            add(interface_name(interface.labels), interface.facets);
         }
         let regions = self.labels.clone().map(|of_cells| Regions { of_cells, names: Vec::new() });
         let tags = Tags::new(&self.mesh, groups, regions)?;

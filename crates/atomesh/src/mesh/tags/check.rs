@@ -1,11 +1,11 @@
-//! What tags promise, and the errors that name what does not hold.
+//! What tags promise, checked.
 
 use std::collections::HashSet;
 
 use super::{FacetGroup, Tags, ascending};
 use crate::mesh::Mesh;
 
-/// What is wrong with tags.
+/// The first promise that tags break.
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]
 #[non_exhaustive]
 pub enum TagsError {
@@ -27,7 +27,7 @@ pub enum TagsError {
         /// The name found.
         name: String,
     },
-    /// The corners are no facet of the mesh.
+    /// The corners are not those of a facet of the mesh.
     #[error("facet group {name:?} has the corners {facet:?}; expected a facet of the mesh")]
     Facet {
         /// The group's name.

@@ -1,7 +1,7 @@
 //! Tags: named groups of facets and cells, by which a solver knows boundaries, features and regions.
 //!
-//! Tags name points and cells by number, so they fit the mesh that they were made for, wherever its points
-//! are moved to, and no other. A facet may be in several groups. Every mesh format can hold their names.
+//! Tags name points and cells by number: they fit only the mesh that they were made for, wherever its points are moved
+//! to. A facet may be in several groups. Every mesh format can hold their names.
 
 mod check;
 mod names;
@@ -97,14 +97,14 @@ impl<const D: usize> Tags<D> {
         self.regions.as_ref()
     }
 
-    /// Whether there is nothing: no group and no region.
+    /// Whether there are no groups and no regions.
     pub fn is_empty(&self) -> bool {
         self.facet_groups.is_empty() && self.regions.is_none()
     }
 
-    /// These tags and those of `other`, both of the same mesh. Groups of one name become one, which has
-    /// each facet once, as here; other groups of `other` keep their ids where these are free, and else get
-    /// the next ones.
+    /// These tags and those of `other`, both of the same mesh. Groups of one name become one, which has each facet once,
+    /// oriented as in these tags. Groups that only `other` has keep their ids if these are free, or else get the next
+    /// ones.
     ///
     /// # Errors
     /// [`TagsError`] if both have regions, or a region of one has the name of a group of the other.
@@ -138,8 +138,8 @@ impl<const D: usize> Tags<D> {
         Ok(self)
     }
 
-    /// The same tags of the mesh with its cells turned over, as a move to a mirrored frame does: every
-    /// facet is turned, so that normals that pointed out still do.
+    /// The tags of the mesh moved by a map that mirrors ([`Mesh::moved`]): every facet is turned over, so that normals
+    /// that pointed out still do.
     pub fn turned(mut self) -> Self {
         for group in &mut self.facet_groups {
             group.facets.iter_mut().for_each(|facet| facet.swap(D - 2, D - 1));

@@ -18,8 +18,8 @@ pub(crate) fn sides_of<const D: usize>(p: &Point<D>, bounds: &Bounds<D>, toleran
 
 impl<const D: usize> Tags<D> {
     /// The hull's facets by the side of the box that they lie on, normals outward: groups 1 `xmin`,
-    /// 2 `xmax`, 3 `ymin` … `zmax`. A point is on a side if it is no farther than `tolerance` from it. Of
-    /// a mesh whose points were moved to the world the groups are those of the lattice mesh. Cost: O(cells).
+    /// 2 `xmax`, 3 `ymin` … `zmax`. A point is on a side if it is at most `tolerance` from it. `mesh` and `bounds` are in
+    /// lattice coordinates; the groups also fit the mesh moved to the world. Cost: O(cells).
     pub fn sides(mesh: &Mesh<D>, bounds: &Bounds<D>, tolerance: f64) -> Self {
         let on_sides: Vec<u8> =
             mesh.points().iter().map(|p| sides_of(p, bounds, tolerance)).collect();
@@ -47,7 +47,7 @@ impl<const D: usize> Tags<D> {
     }
 }
 
-/// Drops facets that come twice: they lie between two cells.
+/// Drops facets that occur twice: they lie between two cells.
 fn drop_pairs<const D: usize>(facets: &mut Vec<[u32; D]>) {
     let mut count = HashMap::new();
     facets.iter().for_each(|facet| *count.entry(ascending(facet)).or_insert(0) += 1);
