@@ -1,9 +1,8 @@
 //! What differs between flat images and volumes, as values.
 
 use atomesh::image::Image;
-use atomesh::mesh::Mesh;
+use atomesh::mesh::{Mesh, PolyMesh};
 use atomesh::run::Method;
-use atomesh::voronoi::PolyMesh;
 use atomesh_draw::{
     DrawError, FlowPicture, FlowStyle, Picture, Style, draw_flat, draw_flow, draw_flow_slices,
     draw_polygons, draw_polyhedra, draw_slices,

@@ -5,8 +5,8 @@ use std::path::{Path, PathBuf};
 use atomesh::image::Image;
 use atomesh::improve::ImproveReport;
 use atomesh::measure::{AlignmentReport, ShapeReport, shape};
+use atomesh::mesh::PolyReport;
 use atomesh::run::{MeshReport, Outcome, Prepared, RunError, VoronoiReport};
-use atomesh::voronoi::PolyReport;
 use atomesh_io::image::AnyImage;
 use serde_json::json;
 

@@ -1,7 +1,6 @@
 //! The last stage on the way to Voronoi's cells, after the atoms have settled.
 
-use crate::mesh::Mesh;
-use crate::voronoi::PolyMesh;
+use crate::mesh::{Mesh, PolyMesh};
 use crate::watch::Watch;
 
 use super::connected::Connected;

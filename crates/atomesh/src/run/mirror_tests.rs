@@ -4,7 +4,7 @@ use super::*;
 use crate::geometry::{Bounds, Point, difference, distance_squared, dot};
 use crate::image::{Frame, Image, Samples};
 use crate::measure::{AlignmentOptions, Features as Points, alignment_of_faces};
-use crate::voronoi::PolyMesh;
+use crate::mesh::PolyMesh;
 use crate::watch::Silent;
 
 /// b of features that repel: a Gaussian of `width` samples across the distance to each, the highest of them.
@@ -41,7 +41,7 @@ fn options<const D: usize>(d: f64) -> MeshOptions<D> {
 fn assert_sound<const D: usize>(outcome: &Outcome<D>, cells: &PolyMesh<D>) {
     cells.validate(&outcome.potential().grid().bounds()).unwrap();
     for (&a, &b) in cells.owners().iter().zip(cells.neighbours()) {
-        let [p, q] = [a, b].map(|cell| cells.sites()[cell as usize]);
+        let [p, q] = [a, b].map(|cell| cells.centers()[cell as usize]);
         let d = outcome.distance().at(&p).min(outcome.distance().at(&q));
         let gap = distance_squared(&p, &q).sqrt() / d;
         assert!(gap >= 0.4, "{p:?} and {q:?} are {gap} d apart");
@@ -202,7 +202,7 @@ fn without_features_nothing_changes() {
         let (outcome, with) = cells(&Method::plane(), &b, options(6.0));
         let plain = MeshOptions { mirror: false, ..options(6.0) };
         let (_, without) = cells(&Method::plane(), &b, plain);
-        assert_eq!(with.sites(), without.sites());
+        assert_eq!(with.centers(), without.centers());
         assert_eq!(outcome.mirror_report(), None);
     }
 }
@@ -227,7 +227,7 @@ fn a_well_stays_beside_and_on_a_feature() {
         let seed_points = vec![well];
         let given = MeshOptions { seed_points, ..options(6.0) };
         let (outcome, cells) = cells(&Method::plane(), &b, given);
-        assert!(cells.sites().contains(&well), "{well:?}");
+        assert!(cells.centers().contains(&well), "{well:?}");
         assert_sound(&outcome, &cells);
     }
 }
@@ -241,6 +241,6 @@ fn sites_do_not_depend_on_the_number_of_threads() {
         pool.install(|| cells(&Method::space(), &b, options(5.0)).1)
     };
     let (one, two) = (run(1), run(2));
-    assert_eq!(one.sites(), two.sites());
+    assert_eq!(one.centers(), two.centers());
     assert_eq!(one.points(), two.points());
 }

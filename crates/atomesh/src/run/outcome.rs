@@ -2,17 +2,20 @@
 
 use rayon::prelude::*;
 
-use crate::features::{FacetField, FeatureFacetOptions, FeatureSet, find_features};
+use crate::features::{
+    FacetField, FeatureFaces, FeatureFacetOptions, FeatureSet, feature_faces, find_features,
+};
 use crate::fields::{NominalDistance, ScalarField, feature_density};
 use crate::geometry::{Bounds, Point};
 use crate::image::{Frame, Grid, Samples, Units};
 use crate::improve::ImproveReport;
 use crate::measure::FidelityReport;
-use crate::mesh::{FacetGroup, Mesh, Quadratic, Regions, Tags, TagsError};
+use crate::mesh::{
+    FacetGroup, MASK_NAME, Mesh, PolyMesh, Quadratic, Regions, Tags, TagsError, interface_name,
+};
 use crate::mirror::MirrorReport;
 use crate::optimize::OptimizeReport;
 use crate::region::{Outline, interfaces};
-use crate::voronoi::{FeatureFaces, PolyMesh, feature_faces};
 use crate::watch::Watch;
 
 use super::compiled::Stages;
@@ -280,10 +283,10 @@ pub(super) fn tags_of<const D: usize>(outcome: &Outcome<D>) -> Result<Tags<D>, T
         groups.push(FacetGroup { id, name, facets });
     };
     if outcome.outline().is_some() {
-        add("mask".into(), outcome.outline_facets.clone());
+        add(MASK_NAME.into(), outcome.outline_facets.clone());
     }
-    for ([low, high], facets) in outcome.labels.iter().flat_map(|l| interfaces(&outcome.mesh, l)) {
-        add(format!("interface-{low}-{high}"), facets);
+    for interface in outcome.labels.iter().flat_map(|l| interfaces(&outcome.mesh, l)) {
+        add(interface_name(interface.labels), interface.facets);
     }
     let regions = outcome.labels.clone().map(|of_cells| Regions { of_cells, names: Vec::new() });
     let tags = Tags::new(&outcome.mesh, groups, regions)?;
@@ -316,32 +319,16 @@ pub fn sides<const D: usize>(mesh: &Mesh<D>, bounds: &Bounds<D>, mirrored: bool)
 
 /// The mesh with its points moved to the world: cells turn over where the frame mirrors.
 fn place<const D: usize>(mesh: &Mesh<D>, frame: &Frame<D>, units: Units) -> Mesh<D> {
-    moved(mesh, frame.is_mirrored(), |p| frame.lattice_to_world(units, p))
+    mesh.moved(frame.is_mirrored(), |p| frame.lattice_to_world(units, p))
 }
 
 /// A mesh in world coordinates, moved back to the lattice coordinates of an image's frame; the
 /// inverse of [`Outcome::world_mesh`].
 pub fn lattice_mesh<const D: usize>(mesh: &Mesh<D>, frame: &Frame<D>, units: Units) -> Mesh<D> {
-    moved(mesh, frame.is_mirrored(), |p| frame.world_to_lattice(units, p))
-}
-
-/// The mesh with its points moved, its cells turned over if the move mirrors.
-fn moved<const D: usize>(
-    mesh: &Mesh<D>,
-    mirrored: bool,
-    to: impl Fn(&Point<D>) -> Point<D> + Send + Sync,
-) -> Mesh<D> {
-    let points = mesh.points().par_iter().with_min_len(1 << 10).map(to).collect();
-    let mut corners = mesh.corners().to_vec();
-    if mirrored {
-        corners.chunks_exact_mut(D + 1).for_each(|cell| cell.swap(D - 1, D));
-    }
-    Mesh::new(points, corners).expect("finite frames keep points finite")
+    mesh.moved(frame.is_mirrored(), |p| frame.world_to_lattice(units, p))
 }
 
 /// The mesh with its points moved from lattice to sample coordinates.
 pub(super) fn in_samples<const D: usize>(mesh: &Mesh<D>, grid: &Grid<D>) -> Mesh<D> {
-    let to_sample = |p: &Point<D>| std::array::from_fn(|k| p[k] / grid.step[k]);
-    let points = mesh.points().iter().map(to_sample).collect();
-    Mesh::new(points, mesh.corners().to_vec()).expect("steps above 0 keep points finite")
+    mesh.moved(false, |p| std::array::from_fn(|k| p[k] / grid.step[k]))
 }

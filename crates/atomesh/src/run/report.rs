@@ -7,8 +7,7 @@ use crate::measure::{
     MeasureError, ShapeReport, SpreadReport, WantedSize, alignment, alignment_of_faces, features,
     fidelity, precision, shape, spread,
 };
-use crate::mesh::Mesh;
-use crate::voronoi::PolyReport;
+use crate::mesh::{Mesh, PolyReport};
 use crate::watch::Watch;
 
 use super::error::RunError;

@@ -4,7 +4,9 @@ use crate::lattice::{Lattice, Outlined};
 use crate::mesh::{Mesh, merge_duplicates};
 use crate::mirror::MirrorReport;
 use crate::optimize::OptimizeReport;
-use crate::region::{Outline, RegionError, Trimmed, fit, smooth, trim};
+use crate::region::{
+    Outline, RegionError, Trimmed, fit_facets, smooth_outline, trim_to_outline,
+};
 use crate::voronoi::{sites_apart, voronoi};
 use crate::watch::Watch;
 
@@ -118,9 +120,9 @@ fn connect_within<const D: usize>(
     }
     let (outlined, mesh) = outlined.connect(method.delaunay(), outline, distance, watch)?;
     let freedom = outlined.lattice().freedom();
-    let trimmed = trim(mesh, (outlined.on_outline(), &freedom), outline, watch)?;
+    let trimmed = trim_to_outline(mesh, outlined.on_outline(), &freedom, outline, watch)?;
     drop(outlined);
-    let mut trimmed = fit(smooth(trimmed, outline, watch)?, outline)?;
+    let mut trimmed = fit_facets(smooth_outline(trimmed, outline, watch)?, outline)?;
     for &point in trimmed.facets.as_flattened() {
         trimmed.freedom[point as usize] = 0;
     }
