@@ -1,7 +1,8 @@
 //! The second stage: atoms that fill the box, not yet moved by the image.
 
+use crate::crests::repelling_crests;
 use crate::lattice::Lattice;
-use crate::mirror::{Mirrored, crests, mirror};
+use crate::mirror::{MirroredLattice, Settling, mirror};
 use crate::optimize::{OptimizeReport, optimize};
 use crate::watch::Watch;
 
@@ -55,11 +56,14 @@ pub(super) fn settle<const D: usize>(
     let Filled { run, lattice } = filled;
     let Parts { method, options, .. } = run.parts();
     let options = &options.optimize;
-    let crests = if run.pairs_atoms() { crests(run.fields(), watch)? } else { Vec::new() };
+    let crests = match run.pairs_atoms() {
+        true => repelling_crests(run.fields(), watch)?,
+        false => Vec::new(),
+    };
     if !crests.is_empty() {
-        let how = (method.scatterer(), options);
-        let Mirrored { lattice, report, optimize_report } =
-            mirror(lattice, &crests, run.fields(), how, watch)?;
+        let settling = Settling { scatterer: method.scatterer(), options };
+        let MirroredLattice { lattice, report, optimize_report } =
+            mirror(lattice, &crests, run.fields(), settling, watch)?;
         return Ok(Settled { run, lattice, report: optimize_report, mirror_report: Some(report) });
     }
     if run.stays_as_grown() {
