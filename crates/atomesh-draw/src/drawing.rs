@@ -3,8 +3,7 @@
 //! The functions behind it are compiled in this crate, once for each dimension.
 
 use atomesh::image::Image;
-use atomesh::mesh::Mesh;
-use atomesh::voronoi::PolyMesh;
+use atomesh::mesh::{Mesh, PolyMesh};
 
 use crate::error::DrawError;
 use crate::flow::{FlowPicture, FlowStyle, draw_flow, draw_flow_slices};

@@ -3,9 +3,9 @@
 //! The functions behind it are compiled in this crate, once for each dimension. A caller that names the generic
 //! functions themselves compiles them again.
 
+use atomesh::features::FeatureFaces;
 use atomesh::geometry::Point;
-use atomesh::mesh::{Mesh, Tags};
-use atomesh::voronoi::{FeatureFaces, PolyMesh};
+use atomesh::mesh::{Mesh, PolyMesh, Tags};
 use atomesh::watch::Watch;
 
 use crate::dg::{self, DgOptions, DgSolution};

@@ -2,8 +2,7 @@
 
 use atomesh::geometry::Point;
 use atomesh::image::Image;
-use atomesh::mesh::Mesh;
-use atomesh::voronoi::PolyMesh;
+use atomesh::mesh::{Mesh, PolyMesh};
 
 use crate::error::DrawError;
 

@@ -5,7 +5,7 @@
 //! of least norm that balances each piece: exact where the velocity is constant.
 
 use atomesh::geometry::{Point, Simplex, difference, dot};
-use atomesh::voronoi::PolyMesh;
+use atomesh::mesh::PolyMesh;
 
 use super::simplex::Corners;
 use crate::grid::FlowGrid;
@@ -89,7 +89,7 @@ impl<'a, const D: usize> FluxField<'a, D> {
         let mut signs = Vec::new();
         for (face, sign) in mesh.faces_of(cell) {
             let start = pieces.len();
-            for corners in mesh.parts(face) {
+            for corners in mesh.face_parts(face) {
                 let others = corners.map(|corner| mesh.points()[corner as usize]);
                 let simplex = Simplex { first, others };
                 let mut numbers = [CENTROID; 4];

@@ -104,7 +104,7 @@ fn parts<const D: usize>(field: &FluxField<'_, D>, facet: u32) -> Vec<FacetPart<
         let share = Simplex { first, others: points }.measure().abs();
         FacetPart { corners, points, share }
     };
-    let mut parts: Vec<_> = mesh.parts(facet as usize).map(part).collect();
+    let mut parts: Vec<_> = mesh.face_parts(facet as usize).map(part).collect();
     let whole: f64 = parts.iter().map(|part| part.share).sum();
     let share = |measure: f64| if whole > 0.0 { measure / whole } else { 0.0 };
     parts.iter_mut().for_each(|part| part.share = share(part.share));
