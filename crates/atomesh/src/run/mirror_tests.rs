@@ -1,9 +1,10 @@
 //! Whether faces of Voronoi cells fall on features that repel.
 
 use super::*;
+use crate::crests::FeaturePoint;
 use crate::geometry::{Bounds, difference, distance_squared, dot};
 use crate::image::Samples;
-use crate::measure::{AlignmentOptions, Features as Points, alignment_of_faces};
+use crate::measure::{AlignmentOptions, alignment_of_faces};
 use crate::watch::Silent;
 
 /// b of features that repel: a Gaussian of `width` samples across the distance to each, the highest of them.
@@ -49,8 +50,8 @@ fn assert_sound<const D: usize>(outcome: &Outcome<D>, cells: &PolyMesh<D>) {
 
 /// The share of points that a face passes within max(1, d/10) and 20° of the normal.
 fn recall<const D: usize>(cells: &PolyMesh<D>, on: &[(Point<D>, Point<D>)], d: f64) -> f64 {
-    let (positions, normals) = on.iter().copied().unzip();
-    let points = Points { positions, normals };
+    let point = |&(position, normal)| FeaturePoint { index: 0, position, normal, strength: 1.0 };
+    let points: Vec<FeaturePoint<D>> = on.iter().map(point).collect();
     let report =
         alignment_of_faces(cells, &points, &AlignmentOptions::new(d), &mut Silent).unwrap();
     assert!(report.features > 50, "{}", report.features);

@@ -35,6 +35,7 @@ pub use method::Method;
 pub use options::{LatticeKind, MeshKind, MeshOptions, POINTS_PER_WAVELENGTH, Size};
 pub use outcome::{MeshReport, Outcome, VoronoiReport, sides};
 
+use crate::crests::repelling_crests;
 use crate::enhance::{self, FeatureOptions, Features};
 use crate::fields::Fields;
 use crate::fields::{GRADIENT_LIMIT, Grading, NominalDistance, default_distance};
@@ -46,7 +47,7 @@ use crate::lattice::{
     GrowOptions, Lattice, Outlined, Place, ScatterOptions, fill_holes, grow_within, scatter, settle,
 };
 use crate::mesh::{Mesh, merge_duplicates};
-use crate::mirror::{MirrorReport, Mirrored, crests, mirror};
+use crate::mirror::{MirrorReport, MirroredLattice, Settling, mirror};
 use crate::optimize::{EngineKind, OptimizeReport, optimize};
 use crate::region::{
     Outline, RegionError, Trimmed, fit, islands, label_samples, outline_facets, smooth, trim,
@@ -448,11 +449,14 @@ impl<const D: usize> Prepared<'_, D> {
         watch: &mut dyn Watch,
     ) -> Result<(Lattice<D>, OptimizeReport, Option<MirrorReport>), RunError> {
         let options = &self.options.optimize;
-        let crests = if self.is_mirrored() { crests(self.fields(), watch)? } else { Vec::new() };
+        let crests = match self.is_mirrored() {
+            true => repelling_crests(self.fields(), watch)?,
+            false => Vec::new(),
+        };
         if !crests.is_empty() {
-            let how = (self.method.scatterer(), options);
-            let Mirrored { lattice, report, optimize_report } =
-                mirror(lattice, &crests, self.fields(), how, watch)?;
+            let settling = Settling { scatterer: self.method.scatterer(), options };
+            let MirroredLattice { lattice, report, optimize_report } =
+                mirror(lattice, &crests, self.fields(), settling, watch)?;
             return Ok((lattice, optimize_report, Some(report)));
         }
         if self.stays_as_grown() {

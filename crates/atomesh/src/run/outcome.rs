@@ -7,9 +7,9 @@ use crate::geometry::{Bounds, Point};
 use crate::image::{Frame, Grid, Samples, Units};
 use crate::improve::ImproveReport;
 use crate::measure::{
-    AlignmentOptions, AlignmentReport, FACET_THRESHOLD, FidelityReport, HomogeneityReport,
-    MeasureError, ShapeReport, SpreadReport, WantedSize, alignment, alignment_of_faces, features,
-    fidelity, precision, shape, spread,
+    AlignmentOptions, AlignmentReport, FidelityReport, HomogeneityReport, MeasureError,
+    PrecisionOptions, SampledPotential, ShapeReport, SpreadReport, WantedSize, alignment,
+    alignment_of_faces, features, fidelity, precision, shape, spread,
 };
 use crate::mesh::{FacetGroup, Mesh, Quadratic, Regions, Tags, TagsError};
 use crate::mirror::MirrorReport;
@@ -144,7 +144,8 @@ impl<const D: usize> Outcome<D> {
         let grid = self.potential.grid();
         let size = samples_of(self.distance.mean(), grid);
         let valleys: Vec<f32> = self.potential.samples().iter().map(|b| -b.abs()).collect();
-        let found = features(&valleys, grid.shape, size, watch)?;
+        let b = SampledPotential { values: &valleys, shape: grid.shape };
+        let found = features(b, size, watch)?;
         let options = AlignmentOptions::new(size);
         let alignment = alignment_of_faces(&in_samples, &found, &options, watch)?;
         Ok(Some(VoronoiReport { shape: PolyReport::new(cells, &grid.bounds()), alignment }))
@@ -360,12 +361,12 @@ impl MeshReport {
         let spread = spread(mesh, size, watch)?;
         let shape = shape(mesh, bounds.as_ref(), watch)?;
         let size = samples_of(size.mean, grid);
-        let found = features(potential, grid.shape, size, watch)?;
+        let b = SampledPotential { values: potential, shape: grid.shape };
+        let found = features(b, size, watch)?;
         let options = AlignmentOptions::new(size);
         let mesh = in_samples(mesh, grid);
         let mut alignment = alignment(&mesh, &found, &options, watch)?;
-        let b = (potential, grid.shape);
-        let selected = precision(&mesh, b, &found, (size, FACET_THRESHOLD), watch)?;
+        let selected = precision(&mesh, b, &found, PrecisionOptions::new(size), watch)?;
         alignment.selected = Some(selected);
         Ok(Self { shape, alignment, spread, fidelity: None, homogeneity: None })
     }
