@@ -13,7 +13,7 @@ mod plane;
 mod space;
 
 pub use plane::PlaneImprover;
-pub use space::Space;
+pub use space::SpaceImprover;
 
 use crate::fields::Fields;
 use crate::mesh::{Mesh, MeshError};
