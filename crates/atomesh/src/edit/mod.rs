@@ -165,8 +165,7 @@ impl<const D: usize> Editor<D> {
             return Err(error);
         }
         self.is_atom.push(true);
-        let is_free = |k: usize| self.bounds.min[k] < at[k] && at[k] < self.bounds.max[k];
-        self.freedom.push((0..D).fold(0, |set, k| set | u8::from(is_free(k)) << k));
+        self.freedom.push(self.bounds.freedom(&at));
         Ok(AtomId(atom))
     }
 
@@ -176,7 +175,7 @@ impl<const D: usize> Editor<D> {
     /// [`EditError`] if there is no such atom, or it is a corner of the box.
     pub fn remove(&mut self, atom: AtomId) -> Result<(), EditError> {
         let p = self.place(atom)?;
-        if (0..D).all(|k| p[k] == self.bounds.min[k] || p[k] == self.bounds.max[k]) {
+        if self.bounds.is_corner(&p) {
             return Err(EditError::Corner { atom });
         }
         self.change(&[(atom.0, None)])?;
@@ -192,16 +191,14 @@ impl<const D: usize> Editor<D> {
     pub fn move_to(&mut self, atom: AtomId, to: Point<D>) -> Result<(), EditError> {
         let from = self.place(atom)?;
         self.check_inside(&to)?;
-        let on_side =
-            |p: &Point<D>, k: usize| p[k] == self.bounds.min[k] || p[k] == self.bounds.max[k];
-        if let Some(axis) = (0..D).find(|&k| on_side(&from, k) && to[k] != from[k]) {
+        let held = self.bounds.held(&from);
+        if let Some(axis) = (0..D).find(|&k| held >> k & 1 == 1 && to[k] != from[k]) {
             return Err(EditError::Held { atom, axis });
         }
-        let held = (0..D).filter(|&k| on_side(&to, k)).fold(0, |set, k| set | 1 << k);
         if from != to {
             self.change(&[(atom.0, Some(to))])?;
             self.points[atom.0 as usize] = to;
-            self.freedom[atom.0 as usize] &= !held;
+            self.freedom[atom.0 as usize] &= self.bounds.freedom(&to);
         }
         Ok(())
     }
@@ -277,10 +274,10 @@ impl<const D: usize> Editor<D> {
     }
 
     fn check_inside(&self, p: &Point<D>) -> Result<(), EditError> {
-        let Bounds { min, max } = self.bounds;
-        if (0..D).all(|k| (min[k]..=max[k]).contains(&p[k])) {
+        if self.bounds.contains(p) {
             return Ok(());
         }
+        let Bounds { min, max } = self.bounds;
         Err(EditError::Outside { point: p.to_vec(), min: min.to_vec(), max: max.to_vec() })
     }
 }

@@ -252,7 +252,7 @@ mod tests {
 
     /// All within reach are listed, and nobody farther than rounding to single precision explains.
     fn assert_lists<const D: usize>(atoms: &[Point<D>], range: &[f64], what: &str) {
-        let extent = Bounds::of(atoms).unwrap().extent().into_iter().fold(0.0, f64::max);
+        let extent = Bounds::of(atoms).unwrap().longest_edge();
         let longer: Vec<f64> = range.iter().map(|r| r * (1.0 + 1e-5) + 1e-5 * extent).collect();
         let (least, most) = (direct(atoms, range), direct(atoms, &longer));
         for (i, found) in lists_of(atoms, range).iter().enumerate() {

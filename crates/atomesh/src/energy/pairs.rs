@@ -145,9 +145,9 @@ impl<'a, const D: usize> PairsEngine<'a, D> {
 
     /// The box of the atoms.
     fn bounds(&self, atoms: &[Point<D>]) -> Bounds<D> {
-        let wider = |a: Bounds<D>, b: Bounds<D>| Bounds {
-            min: std::array::from_fn(|k| a.min[k].min(b.min[k])),
-            max: std::array::from_fn(|k| a.max[k].max(b.max[k])),
+        let wider = |mut a: Bounds<D>, b: Bounds<D>| {
+            a.join(&b);
+            a
         };
         let chunks = atoms.par_chunks(CHUNK * 8).filter_map(Bounds::of);
         chunks.reduce_with(wider).unwrap_or_else(|| self.potential.grid().bounds())

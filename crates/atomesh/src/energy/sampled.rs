@@ -175,7 +175,7 @@ impl<'a, const D: usize> SampledEngine<'a, D> {
             }
             None => {
                 for (i, (p, b)) in slab.iter_mut().zip(b).enumerate() {
-                    *p = self.weight.at(&sample_position(grid, start + i)) as f32 * b;
+                    *p = self.weight.at(&grid.position(start + i)) as f32 * b;
                 }
             }
         }
@@ -334,14 +334,6 @@ impl<const D: usize> Centres<D> {
         let last = (first + count + self.reach).min(self.starts.len() - 1);
         &self.sorted[self.starts[first.saturating_sub(self.reach)]..self.starts[last]]
     }
-}
-
-fn sample_position<const D: usize>(grid: &Grid<D>, mut index: usize) -> Point<D> {
-    std::array::from_fn(|k| {
-        let i = index % grid.shape[k];
-        index /= grid.shape[k];
-        i as f64 * grid.step[k]
-    })
 }
 
 impl<const D: usize> Engine<D> for SampledEngine<'_, D> {

@@ -29,16 +29,7 @@ const WEIGHTS: [Weight; 4] =
     [Weight::Constant(0.0), Weight::Constant(0.4), Weight::Constant(1.0), Weight::Field];
 
 fn sample<const D: usize>(grid: &Grid<D>, f: impl Fn(&Point<D>) -> f64) -> Vec<f32> {
-    (0..grid.sample_count())
-        .map(|mut i| {
-            let p = std::array::from_fn(|k| {
-                let index = i % grid.shape[k];
-                i /= grid.shape[k];
-                index as f64 * grid.step[k]
-            });
-            f(&p) as f32
-        })
-        .collect()
+    (0..grid.sample_count()).map(|i| f(&grid.position(i)) as f32).collect()
 }
 
 fn wave<const D: usize>(p: &Point<D>) -> f64 {

@@ -158,7 +158,7 @@ const ROUNDING: f64 = 1e-6;
 
 impl<const D: usize> Scaling<D> {
     pub fn new(bounds: &Bounds<D>) -> Self {
-        let longest = bounds.extent().into_iter().fold(0.0, f64::max);
+        let longest = bounds.longest_edge();
         let scale = if longest > 0.0 { 1.0 / longest } else { 1.0 };
         Self { origin: bounds.min, scale }
     }

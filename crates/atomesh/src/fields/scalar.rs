@@ -331,16 +331,7 @@ mod tests {
         interpolation: Interpolation,
     ) -> ScalarField<D> {
         let grid = Grid { shape, step };
-        let samples = (0..grid.sample_count())
-            .map(|mut i| {
-                let p = std::array::from_fn(|k| {
-                    let index = i % shape[k];
-                    i /= shape[k];
-                    index as f64 * step[k]
-                });
-                b(&p) as f32
-            })
-            .collect();
+        let samples = (0..grid.sample_count()).map(|i| b(&grid.position(i)) as f32).collect();
         ScalarField::new(grid, samples, interpolation).unwrap()
     }
 

@@ -12,7 +12,7 @@ use rayon::prelude::*;
 /// points' extent. Cost: O(n log n).
 pub fn compact_order<const D: usize>(points: &[Point<D>]) -> Vec<u32> {
     let Some(bounds) = Bounds::of(points) else { return Vec::new() };
-    let longest = bounds.extent().into_iter().fold(0.0, f64::max);
+    let longest = bounds.longest_edge();
     let scale = if longest > 0.0 { 1.0 / longest } else { 1.0 };
     let mut entries: Vec<Entry<D>> = points
         .par_iter()

@@ -13,6 +13,7 @@ mod predicates;
 mod sets;
 mod simplex;
 pub use bounds::Bounds;
+pub(crate) use bounds::{all_axes, axes_where};
 pub use compact::{BLOCK, compact_order};
 pub(crate) use order::shares;
 pub use order::{hilbert_order, lexicographic};

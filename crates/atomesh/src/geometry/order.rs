@@ -20,7 +20,7 @@ const KEY_BITS: usize = 60;
 pub fn hilbert_order<const D: usize>(points: &[Point<D>]) -> Vec<u32> {
     let Some(bounds) = Bounds::of(points) else { return Vec::new() };
     let bits = KEY_BITS / D;
-    let side = bounds.extent().into_iter().fold(0.0, f64::max);
+    let side = bounds.longest_edge();
     let cells = (1_u64 << bits) as f64;
     let curve = HilbertCurve::<D>::new();
     let keyed: Vec<(u64, u32)> = points
@@ -297,7 +297,7 @@ mod tests {
         };
         let points: Vec<Point<3>> = (0..5000).map(|_| [next(), next() * 0.1, 3.0]).collect();
         let bounds = Bounds::of(&points).unwrap();
-        let side = bounds.extent().into_iter().fold(0.0, f64::max);
+        let side = bounds.longest_edge();
         let cells = (1_u64 << (KEY_BITS / 3)) as f64;
         let curve = HilbertCurve::<3>::new();
         let key = |i: &u32| {

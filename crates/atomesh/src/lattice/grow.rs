@@ -9,7 +9,7 @@
 //! perfect. Cost: O(atoms). Deterministic.
 
 use crate::fields::NominalDistance;
-use crate::geometry::{Bounds, Point, distance_squared};
+use crate::geometry::{Bounds, Point, all_axes, distance_squared};
 use crate::mesh::MOST_POINTS;
 use crate::region::Outline;
 use crate::watch::{Cancelled, Phase, Watch, check};
@@ -184,7 +184,7 @@ impl<'a, const D: usize> Boundary<'a, D> {
         if let Some(axis) = (0..D).find(|&k| extent[k] <= 0.0) {
             return Err(LatticeError::Thin { axis });
         }
-        let (least, longest) = (distance.least(), extent.iter().copied().fold(0.0, f64::max));
+        let (least, longest) = (distance.least(), bounds.longest_edge());
         if !(LENGTHS.contains(&least) && LENGTHS.contains(&longest)) {
             return Err(LatticeError::Scale { distance: least, extent: longest });
         }
@@ -194,10 +194,7 @@ impl<'a, const D: usize> Boundary<'a, D> {
 
     /// The corners of the box.
     fn corners(&self) -> impl Iterator<Item = Point<D>> + use<D> {
-        let Bounds { min, max } = self.lattice.bounds;
-        (0..1 << D).map(move |c: usize| {
-            std::array::from_fn(|k| if c >> k & 1 == 1 { max[k] } else { min[k] })
-        })
+        self.lattice.bounds.corners()
     }
 
     /// The atoms that nothing moves: the user's, and the corners.
@@ -219,19 +216,17 @@ impl<'a, const D: usize> Boundary<'a, D> {
         }
         let distance = self.place.distance;
         let given = self.lattice.len();
-        let Bounds { min, max } = self.lattice.bounds;
-        let corner = |c: usize| -> Point<D> {
-            std::array::from_fn(|k| if c >> k & 1 == 1 { max[k] } else { min[k] })
-        };
-        for c in (0..1 << D).map(corner) {
+        let bounds = self.lattice.bounds;
+        for c in bounds.corners() {
             if !self.lattice.atoms.contains(&c) && self.place.needs(&c, distance.at(&c)) {
                 self.lattice.push(c, 0, 0.0);
             }
         }
         for axis in 0..D {
             for c in (0..1 << D).filter(|c| c >> axis & 1 == 0) {
-                for x in even_steps(&corner(c), axis, max[axis], distance) {
-                    let mut p = corner(c);
+                let corner = bounds.corner(c);
+                for x in even_steps(&corner, axis, bounds.max[axis], distance) {
+                    let mut p = corner;
                     p[axis] = (x / self.quantum).round() * self.quantum;
                     // only a fixed or planted atom can be in the way
                     let d = distance.at(&p);
@@ -339,8 +334,7 @@ impl<const D: usize> Growth<'_, D> {
     ) -> Result<(), LatticeError> {
         let axes: Vec<usize> = (0..D).filter(|&k| k != normal).collect();
         let Bounds { min, max } = self.lattice.bounds;
-        let mut centre: Point<D> = std::array::from_fn(|k| 0.5 * (min[k] + max[k]));
-        centre = self.snap(centre);
+        let mut centre = self.snap(self.lattice.bounds.centre());
         centre[normal] = if far { max[normal] } else { min[normal] };
         let steps: Vec<Point<D>> = Crystal::hexagonal()
             .neighbors()
@@ -351,7 +345,7 @@ impl<const D: usize> Growth<'_, D> {
                 step
             })
             .collect();
-        let freedom = axes.iter().map(|k| 1u8 << k).sum();
+        let freedom = all_axes::<D>() & !(1 << normal);
         // Atoms of the opposite face, nearer than d in a thin box, do not count; nor do those beside.
         let on_face: Vec<usize> = (0..self.lattice.len())
             .filter(|&i| self.lattice.atoms[i][normal] == centre[normal])
@@ -379,14 +373,13 @@ impl<const D: usize> Growth<'_, D> {
         crystal: &Crystal<D>,
         watch: &mut dyn Watch,
     ) -> Result<(), LatticeError> {
-        let Bounds { min, max } = self.lattice.bounds;
-        let freedom = ((1usize << D) - 1) as u8;
+        let freedom = all_axes::<D>();
         let first = self.lattice.len();
         for s in 0..self.seeds {
             self.surround(s, crystal.neighbors(), freedom, self.gamma);
         }
         if self.lattice.len() == first {
-            let centre = self.snap(std::array::from_fn(|k| 0.5 * (min[k] + max[k])));
+            let centre = self.snap(self.lattice.bounds.centre());
             self.try_to_add(centre, freedom);
         }
         let boundary: Vec<usize> = (0..first).collect();

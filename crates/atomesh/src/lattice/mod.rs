@@ -21,7 +21,7 @@ pub use outline::Outlined;
 pub use scatter::{ScatterOptions, Scatterer, fill_holes, scatter};
 pub use settle::settle;
 
-use crate::geometry::{Bounds, Point, hilbert_order};
+use crate::geometry::{Bounds, Point, all_axes, hilbert_order};
 
 /// Atoms in the box of an image, in lattice coordinates.
 #[derive(Clone, Debug)]
@@ -90,7 +90,7 @@ impl<const D: usize> Lattice<D> {
     /// The axes along which each of `count` points may move, as bits, where atom i became point `merged[i]`:
     /// those that the box leaves to every atom of the point, none where one is frozen.
     pub(crate) fn freedom_of(&self, merged: &[u32], count: usize) -> Vec<u8> {
-        let mut freedom = vec![(1 << D) - 1; count];
+        let mut freedom = vec![all_axes::<D>(); count];
         for (i, &point) in merged.iter().enumerate() {
             freedom[point as usize] &= if self.temperature[i] > 0.0 { self.freedom[i] } else { 0 };
         }

@@ -8,7 +8,7 @@
 use rayon::prelude::*;
 
 use crate::fields::NominalDistance;
-use crate::geometry::{Point, difference, dot};
+use crate::geometry::{Point, all_axes, axes_where, difference, dot};
 use crate::mesh::{ConnectError, Delaunay, Mesh, merge_duplicates};
 use crate::region::{Outline, free_axes};
 use crate::watch::{Phase, Watch, check};
@@ -49,7 +49,7 @@ fn sides<const D: usize>() -> Vec<Side<D>> {
     let mut sides = Vec::new();
     for dimension in 1..=D as u32 {
         for free in (1..1u8 << D).filter(|free| free.count_ones() == dimension) {
-            let fixed = !free & ((1 << D) - 1);
+            let fixed = !free & all_axes::<D>();
             sides.extend(
                 (0..1u8 << D).filter(|far| far & !fixed == 0).map(|far| Side { free, far }),
             );
@@ -387,7 +387,7 @@ impl<const D: usize> Outlined<D> {
 
 /// Whether a point is outside of the outline and within `reach` of it.
 fn is_just_beyond<const D: usize>(p: &Point<D>, outline: &Outline<D>, reach: f64) -> bool {
-    !outline.is_inside(p) && outline.project(p, (1 << D) - 1, reach).is_some()
+    !outline.is_inside(p) && outline.project(p, all_axes::<D>(), reach).is_some()
 }
 
 /// Rounds in which atoms are added where edges cross the outline.
@@ -402,9 +402,9 @@ fn landing<const D: usize>(
 ) -> Option<Point<D>> {
     let p = &lattice.atoms()[i];
     let d = distance.at(p);
-    let free: u8 = (0..D).filter(|&k| lattice.mobility(i, k) > 0.0).map(|k| 1 << k).sum();
+    let free = axes_where::<D>(|k| lattice.mobility(i, k) > 0.0);
     if free == 0 {
-        return outline.project(p, (1 << D) - 1, FIXED_REACH * d).map(|_| *p);
+        return outline.project(p, all_axes::<D>(), FIXED_REACH * d).map(|_| *p);
     }
     let q = outline.project(p, free, REACH * d)?;
     is_clear_of_sides(outline, &q, free, SIDE * d).then_some(q)

@@ -14,7 +14,7 @@ use rayon::prelude::*;
 
 use crate::fields::NominalDistance;
 use crate::geometry::linear::solve;
-use crate::geometry::{Bounds, Point, difference, distance_squared, dot};
+use crate::geometry::{Bounds, Point, all_axes, difference, distance_squared, dot};
 use crate::mesh::{ConnectError, Delaunay, Mesh};
 use crate::watch::{Phase, Watch, check};
 
@@ -106,18 +106,17 @@ pub fn scatter<const D: usize>(
     if D == 3 {
         for face in 0..6 {
             let random = Some(&mut random);
-            fill_face(&mut lattice, face / 2, face % 2 == 1, distance, ROUND_LIMIT, random, watch)?;
+            fill_face(&mut lattice, face, distance, ROUND_LIMIT, random, watch)?;
         }
     }
     let spread =
         Spread { delaunay: &scatterer.delaunay, limit: scatterer.limit, rounds: ROUND_LIMIT };
-    let all = ((1usize << D) - 1) as u8;
     let field = |p: &Point<D>| distance.at(p);
     let mut atoms = lattice.atoms().to_vec();
     start(&mut atoms, &bounds, &field, &mut random);
     spread.complete(&mut atoms, &bounds, &field, watch)?;
     for p in atoms.split_off(lattice.len()) {
-        lattice.push(p, all, 1.0);
+        lattice.push(p, all_axes::<D>(), 1.0);
     }
     Ok(lattice)
 }
@@ -139,7 +138,7 @@ pub fn fill_holes<const D: usize>(
 ) -> Result<Lattice<D>, LatticeError> {
     if D == 3 {
         for face in 0..6 {
-            fill_face(&mut lattice, face / 2, face % 2 == 1, distance, rounds, None, watch)?;
+            fill_face(&mut lattice, face, distance, rounds, None, watch)?;
         }
     }
     let spread = Spread { delaunay: &scatterer.delaunay, limit: scatterer.limit, rounds };
@@ -147,7 +146,7 @@ pub fn fill_holes<const D: usize>(
     let mut atoms = lattice.atoms().to_vec();
     spread.complete(&mut atoms, lattice.bounds(), &field, watch)?;
     for p in atoms.split_off(lattice.len()) {
-        lattice.push(p, ((1usize << D) - 1) as u8, 1.0);
+        lattice.push(p, all_axes::<D>(), 1.0);
     }
     Ok(lattice)
 }
@@ -156,16 +155,16 @@ pub fn fill_holes<const D: usize>(
 /// first.
 fn fill_face<const D: usize>(
     lattice: &mut Lattice<D>,
-    normal: usize,
-    far: bool,
+    side: usize,
     distance: &NominalDistance<D>,
     rounds: usize,
     random: Option<&mut Pcg64>,
     watch: &mut dyn Watch,
 ) -> Result<(), LatticeError> {
     let bounds = *lattice.bounds();
+    let normal = side / 2;
     let (a, b) = ((normal + 1) % D, (normal + 2) % D);
-    let level = if far { bounds.max[normal] } else { bounds.min[normal] };
+    let level = bounds.level(side);
     let lift = |p: &Point<2>| -> Point<D> {
         let mut q = [level; D];
         (q[a], q[b]) = (p[0], p[1]);

@@ -19,16 +19,7 @@ fn constant<const D: usize>(grid: &Grid<D>, d: f64) -> NominalDistance<D> {
 
 /// d as a function of the place, its slope limited to 0.25.
 fn graded<const D: usize>(grid: &Grid<D>, d: impl Fn(&Point<D>) -> f64) -> NominalDistance<D> {
-    let field: Vec<f32> = (0..grid.sample_count())
-        .map(|mut i| {
-            let p = std::array::from_fn(|k| {
-                let index = i % grid.shape[k];
-                i /= grid.shape[k];
-                index as f64 * grid.step[k]
-            });
-            d(&p) as f32
-        })
-        .collect();
+    let field: Vec<f32> = (0..grid.sample_count()).map(|i| d(&grid.position(i)) as f32).collect();
     NominalDistance::from_field(grid, &field, 0.25).unwrap()
 }
 
@@ -68,9 +59,7 @@ fn assert_sound<const D: usize>(
             assert_eq!(lattice.mobility(i, k), f64::from(u8::from(free)), "{what}: {p:?} axis {k}");
         }
     }
-    for c in 0..1 << D {
-        let corner =
-            std::array::from_fn(|k| if c >> k & 1 == 1 { bounds.max[k] } else { bounds.min[k] });
+    for corner in bounds.corners() {
         let count = lattice.atoms().iter().filter(|p| **p == corner).count();
         assert_eq!(count, 1, "{what}: atoms in corner {corner:?}");
     }
@@ -98,7 +87,7 @@ fn near_pairs<const D: usize>(
 
 fn sides<const D: usize>(lattice: &Lattice<D>, i: usize) -> usize {
     let (p, bounds) = (&lattice.atoms()[i], lattice.bounds());
-    (0..D).filter(|&k| p[k] == bounds.min[k] || p[k] == bounds.max[k]).count()
+    bounds.held(p).count_ones() as usize
 }
 
 /// No two atoms nearer than γ times the mean of their d; atoms on edges of the box may be nearer to

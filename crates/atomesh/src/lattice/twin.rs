@@ -6,7 +6,7 @@ use rand_pcg::Pcg64;
 use super::grow::{Boundary, GrowOptions, Place, grow, restart_room};
 use super::{Crystal, Lattice};
 use crate::fields::NominalDistance;
-use crate::geometry::{Bounds, Point, distance_squared};
+use crate::geometry::{Bounds, Point, all_axes, distance_squared};
 use crate::image::Grid;
 use crate::watch::Silent;
 
@@ -60,8 +60,7 @@ impl<const D: usize> Twin<'_, D> {
     }
 
     fn centre(&self) -> Point<D> {
-        let Bounds { min, max } = self.lattice.bounds;
-        std::array::from_fn(|k| (0.5 * (min[k] + max[k]) / self.quantum).round() * self.quantum)
+        self.lattice.bounds.centre().map(|x| (x / self.quantum).round() * self.quantum)
     }
 
     fn face(&mut self, normal: usize, level: f64, seeds: usize) {
@@ -78,7 +77,7 @@ impl<const D: usize> Twin<'_, D> {
         let first = self.lattice.len();
         let mut centre = self.centre();
         centre[normal] = level;
-        let freedom = axes.iter().map(|k| 1u8 << k).sum();
+        let freedom = all_axes::<D>() & !(1 << normal);
         self.try_site(centre, self.gamma, freedom);
         self.fill(first, &on_face, &steps, freedom);
         self.hidden.fill(false);
@@ -102,7 +101,7 @@ fn grown_slowly<const D: usize>(
         twin.face(normal, bounds.min[normal], seeds);
         twin.face(normal, bounds.max[normal], seeds);
     }
-    let (first, all) = (twin.lattice.len(), ((1usize << D) - 1) as u8);
+    let (first, all) = (twin.lattice.len(), all_axes::<D>());
     for s in 0..seeds {
         twin.surround(s, crystal.neighbors(), gamma, all);
     }

@@ -140,15 +140,7 @@ impl<const D: usize> Tags<D> {
     /// 2 `xmax`, 3 `ymin` … `zmax`. A point is on a side if it is no farther than `tolerance` from it. Of
     /// a mesh whose points were moved to the world the groups are those of the lattice mesh. Cost: O(cells).
     pub fn sides(mesh: &Mesh<D>, bounds: &Bounds<D>, tolerance: f64) -> Self {
-        let on_sides: Vec<u8> = (mesh.points().iter())
-            .map(|p| {
-                (0..D).fold(0, |set, k| {
-                    let low = u8::from((p[k] - bounds.min[k]).abs() <= tolerance);
-                    let high = u8::from((p[k] - bounds.max[k]).abs() <= tolerance);
-                    set | low << (2 * k) | high << (2 * k + 1)
-                })
-            })
-            .collect();
+        let on_sides: Vec<u8> = mesh.points().iter().map(|p| bounds.sides(p, tolerance)).collect();
         let mut groups: Vec<FacetGroup<D>> = (0..2 * D)
             .map(|side| {
                 let name = format!("{}{}", ["x", "y", "z"][side / 2], ["min", "max"][side % 2]);

@@ -28,6 +28,7 @@ use rayon::prelude::*;
 
 use crate::fields::Fields;
 use crate::fields::ImageWeight;
+use crate::geometry::all_axes;
 use crate::lattice::{Lattice, LatticeError, Scatterer, fill_holes};
 use crate::optimize::{OptimizeError, OptimizeOptions, OptimizeReport, optimize};
 use crate::watch::{Cancelled, Phase, Watch, check};
@@ -123,7 +124,7 @@ pub fn mirror<const D: usize>(
     let room = Room::new(crests, &pairs, distance, &bounds);
     let report = MirrorReport { places: feet.len(), pairs: pairs.feet.len(), shared: pairs.shared };
     let mut lattice = cleared(lattice, &room, CLEAR[0]);
-    pairs.new_sites().iter().for_each(|&site| lattice.push(site, ((1 << D) - 1) as u8, 0.0));
+    pairs.new_sites().iter().for_each(|&site| lattice.push(site, all_axes::<D>(), 0.0));
     let lattice = fill_holes(scatterer, lattice, distance, FILL_ROUNDS, watch)?.along_curve();
     let none = ImageWeight::constant(0.0).expect("0 is a weight");
     let weight = if fields.potential.range().0 < 0.0 { fields.weight } else { &none };

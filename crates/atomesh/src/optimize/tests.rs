@@ -19,16 +19,7 @@ struct Scene<const D: usize> {
 }
 
 fn sample<const D: usize>(grid: &Grid<D>, f: impl Fn(&Point<D>) -> f64) -> Vec<f32> {
-    (0..grid.sample_count())
-        .map(|mut i| {
-            let p = std::array::from_fn(|k| {
-                let index = i % grid.shape[k];
-                i /= grid.shape[k];
-                index as f64 * grid.step[k]
-            });
-            f(&p) as f32
-        })
-        .collect()
+    (0..grid.sample_count()).map(|i| f(&grid.position(i)) as f32).collect()
 }
 
 impl<const D: usize> Scene<D> {

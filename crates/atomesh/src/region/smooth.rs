@@ -5,7 +5,7 @@
 //! the worst of its cells is best. Then the outline's points step out by what facets between points of a
 //! curved surface lack, so that the mesh has the mask's measure. Cost: O(points at the outline).
 
-use crate::geometry::{Point, Simplex, difference, distance_squared, dot};
+use crate::geometry::{Point, Simplex, all_axes, difference, distance_squared, dot};
 use crate::mesh::{CellsOfPoints, Mesh};
 use crate::watch::{Phase, Watch, check};
 
@@ -199,8 +199,7 @@ pub fn fit<const D: usize>(
         let (centroid, normal) = facet_plane(&facet.map(|c| moving.points[c as usize]));
         let measure = dot(&normal, &normal).sqrt();
         let reach = measure.powf(1.0 / (D as f64 - 1.0));
-        let all = ((1 << D) - 1) as u8;
-        if let Some(q) = outline.project(&centroid, all, 0.5 * reach) {
+        if let Some(q) = outline.project(&centroid, all_axes::<D>(), 0.5 * reach) {
             let lack = dot(&difference(&q, &centroid), &normal) / measure;
             for &c in facet {
                 let (sum, weight) = &mut sums[c as usize];

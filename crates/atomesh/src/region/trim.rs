@@ -8,7 +8,7 @@
 
 use rayon::prelude::*;
 
-use crate::geometry::{Bounds, Point, distance_squared};
+use crate::geometry::{Bounds, Point, axes_where, distance_squared};
 use crate::mesh::Mesh;
 use crate::watch::{Phase, Watch, check};
 
@@ -98,8 +98,8 @@ fn centroid<const D: usize>(mesh: &Mesh<D>, cell: &[u32]) -> Point<D> {
 
 /// Whether points lie on one side of the box.
 fn is_on_side<const D: usize>(mesh: &Mesh<D>, points: &[u32], bounds: &Bounds<D>) -> bool {
-    let all_at = |k: usize, side: f64| points.iter().all(|&c| mesh.points()[c as usize][k] == side);
-    (0..D).any(|k| all_at(k, bounds.min[k]) || all_at(k, bounds.max[k]))
+    let sides = points.iter().map(|&c| bounds.sides(&mesh.points()[c as usize], 0.0));
+    sides.fold(!0, |shared, sides| shared & sides) != 0
 }
 
 fn has_facet_on_side<const D: usize>(mesh: &Mesh<D>, cell: &[u32], bounds: &Bounds<D>) -> bool {
@@ -211,10 +211,7 @@ impl<const D: usize> Cutting<D> {
 
 /// The axes along which a point between two others may move: those that the box does not hold both at.
 pub(crate) fn free_axes<const D: usize>(ends: [&Point<D>; 2], freedom: [u8; 2]) -> u8 {
-    (0..D)
-        .filter(|k| (freedom[0] | freedom[1]) >> k & 1 == 1 || ends[0][*k] != ends[1][*k])
-        .map(|k| 1 << k)
-        .sum()
+    freedom[0] | freedom[1] | axes_where::<D>(|k| ends[0][k] != ends[1][k])
 }
 
 /// Appends the parts of a cell that its cut edges leave, the cut of least rank made first.

@@ -298,7 +298,7 @@ impl<const D: usize> Prepared<'_, D> {
         let seeds: Vec<Point<D>> = (self.options.seed_points.iter())
             .map(|p| self.frame.world_to_lattice(units, p))
             // a point meant to be on the boundary may come back a rounding outside
-            .map(|p| snap_to(&p, &bounds))
+            .map(|p| bounds.snap(&p))
             .collect();
         let lattice = match self.method.crystal(self.options.lattice)? {
             Some(crystal) => {
@@ -513,14 +513,6 @@ impl<const D: usize> Prepared<'_, D> {
             warnings: self.warnings,
         })
     }
-}
-
-/// The nearest point of the box, if it is within a rounding of it; else the point itself.
-fn snap_to<const D: usize>(p: &Point<D>, bounds: &crate::geometry::Bounds<D>) -> Point<D> {
-    let inside = bounds.clamp(p);
-    let extent = bounds.extent();
-    let near = (0..D).all(|k| (inside[k] - p[k]).abs() <= 1e-9 * extent[k]);
-    if near { inside } else { *p }
 }
 
 /// The mesh with its points moved to the world: cells turn over where the frame mirrors.

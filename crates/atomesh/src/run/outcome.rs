@@ -142,7 +142,7 @@ impl<const D: usize> Outcome<D> {
             return Ok(None);
         };
         let grid = self.potential.grid();
-        let size = samples_of(self.distance.mean(), grid);
+        let size = grid.in_samples(self.distance.mean());
         let valleys: Vec<f32> = self.potential.samples().iter().map(|b| -b.abs()).collect();
         let found = features(&valleys, grid.shape, size, watch)?;
         let options = AlignmentOptions::new(size);
@@ -272,12 +272,9 @@ impl<const D: usize> Outcome<D> {
     pub fn quadratic(&self) -> Quadratic<D> {
         let mut quadratic = Quadratic::new(&self.mesh);
         if let Some(outline) = &self.outline {
-            let all = ((1 << D) - 1) as u8;
             let bounds = self.potential.grid().bounds();
             quadratic.curve(&self.outline_facets, |p| {
-                let side = |k: &usize| p[*k] == bounds.min[*k] || p[*k] == bounds.max[*k];
-                let held: u8 = (0..D).filter(side).map(|k| 1 << k).sum();
-                outline.project(p, all & !held, 0.3 * self.distance.at(p))
+                outline.project(p, bounds.freedom(p), 0.3 * self.distance.at(p))
             });
         }
         quadratic.moved(self.frame.is_mirrored(), |p| self.frame.lattice_to_world(self.units, p))
@@ -324,7 +321,7 @@ impl<const D: usize> Outcome<D> {
 /// The sides of a mesh in lattice coordinates, turned as a move to the world turns its cells; see
 /// [`Tags::sides`]. A point may be off a side by 1e-9 of the box.
 pub fn sides<const D: usize>(mesh: &Mesh<D>, bounds: &Bounds<D>, mirrored: bool) -> Tags<D> {
-    let extent = bounds.extent().into_iter().fold(0.0, f64::max);
+    let extent = bounds.longest_edge();
     let tags = Tags::sides(mesh, bounds, 1e-9 * extent);
     if mirrored { tags.turned() } else { tags }
 }
@@ -359,7 +356,7 @@ impl MeshReport {
     ) -> Result<Self, MeasureError> {
         let spread = spread(mesh, size, watch)?;
         let shape = shape(mesh, bounds.as_ref(), watch)?;
-        let size = samples_of(size.mean, grid);
+        let size = grid.in_samples(size.mean);
         let found = features(potential, grid.shape, size, watch)?;
         let options = AlignmentOptions::new(size);
         let mesh = in_samples(mesh, grid);
@@ -369,11 +366,6 @@ impl MeshReport {
         alignment.selected = Some(selected);
         Ok(Self { shape, alignment, spread, fidelity: None, homogeneity: None })
     }
-}
-
-/// A length in samples: by the geometric mean over the axes, where steps differ.
-fn samples_of<const D: usize>(length: f64, grid: &Grid<D>) -> f64 {
-    length / grid.step.iter().product::<f64>().powf(1.0 / D as f64)
 }
 
 /// The mesh with its points moved from lattice to sample coordinates.

@@ -166,9 +166,9 @@ fn angle(cosine: f64) -> f64 {
 impl Whole {
     /// The mesh as it is given.
     fn new(points: Vec<Point<3>>, freedom: &[u8], corners: &[u32], bounds: &Bounds<3>) -> Self {
-        let sides: Vec<u8> = points.iter().map(|p| patch::sides_of(p, bounds)).collect();
+        let sides: Vec<u8> = points.iter().map(|p| bounds.sides(p, 0.0)).collect();
         // whatever the lattice says, a point on a side stays on it
-        let freedom = freedom.iter().zip(&sides).map(|(f, s)| f & !(s | s >> 3)).collect();
+        let freedom = freedom.iter().zip(&points).map(|(f, p)| f & bounds.freedom(p)).collect();
         let corners = corners.chunks_exact(4).map(|c| [c[0], c[1], c[2], c[3]]).collect();
         Self { points, freedom, sides, corners }
     }

@@ -51,8 +51,7 @@ fn parts_of(points: &[Point<3>], cut: f64) -> (Vec<u32>, usize) {
 fn halves<'a>(points: &[Point<3>], slice: &'a mut [u32], cut: f64) -> [&'a mut [u32]; 2] {
     let mut bounds = Bounds { min: [f64::INFINITY; 3], max: [f64::NEG_INFINITY; 3] };
     slice.iter().for_each(|&i| bounds.include(&points[i as usize]));
-    let extent = bounds.extent();
-    let axis = (1..3).fold(0, |best, k| if extent[k] > extent[best] { k } else { best });
+    let axis = bounds.longest_axis();
     let middle = (slice.len() as f64 * cut) as usize;
     if middle > 0 && middle < slice.len() {
         slice.select_nth_unstable_by(middle, |&a, &b| {

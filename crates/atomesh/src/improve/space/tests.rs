@@ -63,7 +63,7 @@ fn crystal(shifts: &[f64]) -> Vec<Point<3>> {
 }
 
 fn sides(p: &Point<3>) -> u8 {
-    patch::sides_of(p, &Bounds { min: [0.0; 3], max: [SIDE; 3] })
+    Bounds { min: [0.0; 3], max: [SIDE; 3] }.sides(p, 0.0)
 }
 
 proptest! {
