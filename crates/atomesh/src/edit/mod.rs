@@ -9,7 +9,7 @@ mod cells;
 mod tests;
 
 use crate::energy::pair;
-use crate::fields::Fields;
+use crate::fields::FieldsView;
 use crate::geometry::{Bounds, Point, distance_squared};
 use crate::lattice::Lattice;
 use crate::mesh::{ConnectError, Delaunay, Mesh};
@@ -213,7 +213,7 @@ impl<const D: usize> Editor<D> {
         &mut self,
         around: &Point<D>,
         reach: f64,
-        fields: Fields<'_, D>,
+        fields: FieldsView<'_, D>,
         options: &OptimizeOptions,
         watch: &mut dyn Watch,
     ) -> Result<OptimizeReport, EditError> {

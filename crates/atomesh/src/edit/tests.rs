@@ -106,10 +106,10 @@ fn relaxing_moves_what_is_near<const D: usize>(crystal: &Crystal<D>, delaunay: D
     // a sheet x = 6.6 attracts
     let b = |i: usize| -(-(((i % 17) as f32 - 6.6) / 1.5).powi(2)).exp();
     let samples = (0..grid.sample_count()).map(b).collect();
-    let potential = ScalarField::new(grid, samples, Interpolation::Linear).unwrap();
+    let potential = ScalarField::potential(grid, samples, Interpolation::Linear).unwrap();
     let weight = ImageWeight::constant(0.4).unwrap();
     let distance = NominalDistance::constant(&grid, D_NOMINAL).unwrap();
-    let fields = Fields { potential: &potential, weight: &weight, distance: &distance };
+    let fields = FieldsView { potential: &potential, weight: &weight, distance: &distance };
     let mut editor = Editor::new(lattice, delaunay, &mut Silent).unwrap();
     let before: Vec<(AtomId, Point<D>)> = editor.atoms().collect();
     let (around, reach) = ([7.0; D], 6.0);

@@ -226,6 +226,15 @@ impl<const D: usize> Level<D> {
     }
 }
 
+/// Where growth starts again from the boundary, a site must be this far from other atoms, over d: holes in a
+/// crystal are smaller, so that where growth has passed little is added.
+const RESTART: f64 = 0.85;
+
+/// The diameter, over d, of the ball that must be free for an atom to be added from the boundary.
+pub(super) fn restart_room(gamma: f64) -> f64 {
+    (2.0 * RESTART - gamma).max(gamma)
+}
+
 #[cfg(test)]
 mod tests {
     use rand::{RngExt, SeedableRng};

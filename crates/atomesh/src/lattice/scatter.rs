@@ -18,9 +18,9 @@ use crate::geometry::{Bounds, Point, all_axes, difference, distance_squared, dot
 use crate::mesh::{ConnectError, Delaunay, Mesh};
 use crate::watch::{Phase, Watch, check};
 
-use super::Lattice;
-use super::grow::{Boundary, LatticeError, Place};
+use super::boundary::{Boundary, Place};
 use super::occupancy::Occupancy;
+use super::{Lattice, LatticeError};
 
 /// What differs between dimensions: how to connect, and the limit of r/d.
 #[derive(Clone, Debug)]

@@ -7,8 +7,7 @@
 
 use rayon::prelude::*;
 
-use super::grow::LatticeError;
-use super::{Lattice, Scatterer};
+use super::{Lattice, LatticeError, Scatterer};
 use crate::fields::NominalDistance;
 use crate::geometry::{Point, Simplex};
 use crate::watch::{Phase, Watch, check};

@@ -27,7 +27,7 @@ pub trait Objective {
 
     /// Shortens parts of a direction that are out of proportion, so that they do not hold back the rest.
     /// Default: none.
-    fn temper(&mut self, direction: &mut [f64]) {
+    fn shorten(&mut self, direction: &mut [f64]) {
         let _ = direction;
     }
 

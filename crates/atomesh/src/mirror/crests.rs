@@ -1,7 +1,7 @@
 //! The crests of b: where faces should fall.
 
 use crate::crests::{Bottom, Search, bottoms, in_large_groups};
-use crate::fields::Fields;
+use crate::fields::FieldsView;
 use crate::geometry::{Point, dot};
 use crate::watch::{Cancelled, Phase, Watch};
 
@@ -30,10 +30,10 @@ pub struct Crest<const D: usize> {
 /// # Errors
 /// [`Cancelled`] if the watch ends the work.
 pub fn crests<const D: usize>(
-    fields: Fields<'_, D>,
+    fields: FieldsView<'_, D>,
     watch: &mut dyn Watch,
 ) -> Result<Vec<Crest<D>>, Cancelled> {
-    let Fields { potential, weight, distance } = fields;
+    let FieldsView { potential, weight, distance } = fields;
     if weight.as_constant() == Some(0.0) || potential.range().1 < LEAST_HEIGHT {
         return Ok(Vec::new());
     }

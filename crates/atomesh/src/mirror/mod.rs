@@ -26,7 +26,7 @@ pub use crests::{Crest, crests};
 
 use rayon::prelude::*;
 
-use crate::fields::Fields;
+use crate::fields::FieldsView;
 use crate::fields::ImageWeight;
 use crate::geometry::all_axes;
 use crate::lattice::{Lattice, LatticeError, Scatterer, fill_holes};
@@ -113,7 +113,7 @@ pub struct Mirrored<const D: usize> {
 pub fn mirror<const D: usize>(
     lattice: Lattice<D>,
     crests: &[Crest<D>],
-    fields: Fields<'_, D>,
+    fields: FieldsView<'_, D>,
     (scatterer, options): (&Scatterer<D>, &OptimizeOptions),
     watch: &mut dyn Watch,
 ) -> Result<Mirrored<D>, MirrorError> {
@@ -129,7 +129,7 @@ pub fn mirror<const D: usize>(
     let none = ImageWeight::constant(0.0).expect("0 is a weight");
     let weight = if fields.potential.range().0 < 0.0 { fields.weight } else { &none };
     let options = OptimizeOptions { smoothing_steps: 0, ..options.clone() };
-    let settled = optimize(lattice, Fields { weight, ..fields }, &options, watch)?;
+    let settled = optimize(lattice, FieldsView { weight, ..fields }, &options, watch)?;
     let (lattice, optimize_report) = settled.into_parts();
     Ok(Mirrored { lattice: cleared(lattice, &room, CLEAR[1]), report, optimize_report })
 }

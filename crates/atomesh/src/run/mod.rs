@@ -36,7 +36,7 @@ pub use options::{LatticeKind, MeshKind, MeshOptions, POINTS_PER_WAVELENGTH, Siz
 pub use outcome::{MeshReport, Outcome, VoronoiReport, sides};
 
 use crate::enhance::{self, FeatureOptions, Features};
-use crate::fields::Fields;
+use crate::fields::FieldsView;
 use crate::fields::{GRADIENT_LIMIT, Grading, NominalDistance, default_distance};
 use crate::fields::{ImageWeight, Interpolation, ScalarField};
 use crate::geometry::{Point, compact_order};
@@ -155,7 +155,7 @@ pub fn prepare<'m, const D: usize>(
         warnings.push(Warning::Coarse { axis, distance, extent });
     }
     check(watch, Phase::Distance, 1.0, None)?;
-    let potential = ScalarField::new(grid, samples, options.interpolation)?;
+    let potential = ScalarField::potential(grid, samples, options.interpolation)?;
     Ok(Prepared {
         method,
         options,
@@ -432,8 +432,8 @@ impl<const D: usize> Prepared<'_, D> {
     }
 
     /// The fields that atoms move in.
-    fn fields(&self) -> Fields<'_, D> {
-        Fields { potential: &self.potential, weight: &self.weight, distance: &self.distance }
+    fn fields(&self) -> FieldsView<'_, D> {
+        FieldsView { potential: &self.potential, weight: &self.weight, distance: &self.distance }
     }
 
     /// Whether pairs of atoms are made where features repel.

@@ -6,18 +6,18 @@
 //! large. It never falls below its own minimum. Lengths are in lattice units.
 
 mod coarse;
+mod default;
 mod grading;
 mod limit;
-mod tidy;
 
-use crate::geometry::Point;
+use crate::geometry::{Bounds, Point};
 use crate::image::Grid;
 use coarse::{Take, coarse_grid, reduce};
 use limit::limit_gradient;
 use rayon::prelude::*;
 
+pub use default::default_distance;
 pub use grading::{GradeBy, Grading, feature_density};
-pub use tidy::default_distance;
 
 /// Greatest slope of d where none is asked for, in lattice units of d per lattice unit of way.
 ///
@@ -89,8 +89,8 @@ pub struct NominalDistance<const D: usize> {
     inverse_step: [f64; D],
     /// d at the nodes, x fastest; empty for a constant.
     values: Vec<f32>,
-    /// The box's area or volume.
-    measure: f64,
+    /// The image's box.
+    bounds: Bounds<D>,
     least: f64,
     greatest: f64,
     greatest_slope: f64,
@@ -108,7 +108,7 @@ impl<const D: usize> NominalDistance<D> {
             nodes: Grid { shape: [1; D], step: grid.step },
             inverse_step: [0.0; D],
             values: Vec::new(),
-            measure: grid.bounds().measure(),
+            bounds: grid.bounds(),
             least: distance,
             greatest: distance,
             greatest_slope: 0.0,
@@ -150,7 +150,7 @@ impl<const D: usize> NominalDistance<D> {
             greatest_slope: if constant { 0.0 } else { greatest_slope(&values, &nodes) },
             nodes: if constant { Grid { shape: [1; D], step: nodes.step } } else { nodes },
             values: if constant { Vec::new() } else { values },
-            measure: grid.bounds().measure(),
+            bounds: grid.bounds(),
             least,
             greatest,
         }
@@ -192,6 +192,11 @@ impl<const D: usize> NominalDistance<D> {
         sum
     }
 
+    /// The image's box.
+    pub fn bounds(&self) -> &Bounds<D> {
+        &self.bounds
+    }
+
     /// The least d anywhere.
     pub fn least(&self) -> f64 {
         self.least
@@ -223,7 +228,7 @@ impl<const D: usize> NominalDistance<D> {
     /// `density` is the crystal's number of atoms per d^D: 2/√3 for hexagonal, √2 for FCC, 3√3/4
     /// for BCC.
     pub fn estimated_atoms(&self, density: f64) -> f64 {
-        self.measure * self.average(|d| density / d.powi(D as i32))
+        self.bounds.measure() * self.average(|d| density / d.powi(D as i32))
     }
 
     /// The mean of a function of d over the box, by the trapezoidal rule. Rows are added in their order,

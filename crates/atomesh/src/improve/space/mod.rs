@@ -28,7 +28,7 @@ mod tests;
 mod valley;
 
 use super::{Align, ImproveError, ImproveOptions, ImproveReport, Improver};
-use crate::fields::Fields;
+use crate::fields::FieldsView;
 use crate::geometry::{Bounds, Point};
 use crate::mesh::Mesh;
 use crate::watch::{Phase, Watch, check};
@@ -52,7 +52,7 @@ const BLOCK: usize = 1 << 13;
 /// What all parts are worked on by.
 struct Work<'a> {
     valley: Option<Valley<'a>>,
-    fields: Fields<'a, 3>,
+    fields: FieldsView<'a, 3>,
     align: Align,
     /// The greatest cosine of a dihedral angle.
     floor: f64,
@@ -63,7 +63,7 @@ impl Improver<3> for Space {
         &self,
         mesh: Mesh<3>,
         freedom: &[u8],
-        fields: Fields<'_, 3>,
+        fields: FieldsView<'_, 3>,
         options: &ImproveOptions,
         watch: &mut dyn Watch,
     ) -> Result<(Mesh<3>, ImproveReport), ImproveError> {

@@ -23,7 +23,7 @@ fn potential(b: impl Fn(&Point<3>) -> f64) -> ScalarField<3> {
     let grid = Grid { shape: [13; 3], step: [1.0; 3] };
     let at = |i: usize| [i % 13, i / 13 % 13, i / 169].map(|k| k as f64);
     let samples = (0..grid.sample_count()).map(|i| b(&at(i)) as f32).collect();
-    ScalarField::new(grid, samples, Interpolation::Linear).unwrap()
+    ScalarField::potential(grid, samples, Interpolation::Linear).unwrap()
 }
 
 /// A Delaunay mesh of the box's corners and of points within it, some of them drawn to its sides.
@@ -46,7 +46,7 @@ fn improve(
 ) -> Result<(Mesh<3>, ImproveReport), ImproveError> {
     let weight = ImageWeight::constant(beta).unwrap();
     let distance = NominalDistance::constant(potential.grid(), 3.0).unwrap();
-    let fields = Fields { potential, weight: &weight, distance: &distance };
+    let fields = FieldsView { potential, weight: &weight, distance: &distance };
     let freedom = vec![7; mesh.points().len()];
     Space.improve(mesh, &freedom, fields, options, &mut Silent)
 }
@@ -226,7 +226,7 @@ fn a_floor_out_of_range_is_refused_and_a_watch_ends_the_work() {
     let potential = potential(sheet);
     let weight = ImageWeight::constant(0.4).unwrap();
     let distance = NominalDistance::constant(potential.grid(), 3.0).unwrap();
-    let fields = Fields { potential: &potential, weight: &weight, distance: &distance };
+    let fields = FieldsView { potential: &potential, weight: &weight, distance: &distance };
     let freedom = vec![7; mesh.points().len()];
     let options = ImproveOptions::for_dimension(3);
     let ended = Space.improve(mesh, &freedom, fields, &options, &mut Never);
