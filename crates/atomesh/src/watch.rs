@@ -58,7 +58,7 @@ impl Phase {
     }
 }
 
-/// The atoms between two iterations, as flat rows of numbers, so that one watch serves the plane and space.
+/// The atoms between two iterations, as plain rows of numbers, so that one watch serves the plane and space.
 #[derive(Clone, Copy, Debug)]
 #[non_exhaustive]
 pub struct AtomsView<'a> {

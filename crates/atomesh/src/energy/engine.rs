@@ -32,7 +32,7 @@ impl std::iter::Sum for Energy {
 
 /// Computes the total potential energy of atoms and its gradient.
 ///
-/// `energy::conformance`, behind the cargo feature of that name, tests what is written here.
+/// `energy::conformance`, behind the cargo feature of that name, tests these promises.
 pub trait Engine<const D: usize>: Sync {
     /// Makes ready for atoms at or near `atoms`: reads d(x) and β(x) there, builds lists. To be called
     /// before the first evaluation and then between iterations; it does only what is due. `next_move` is

@@ -2,12 +2,12 @@
 //!
 //! The total potential field p(x) of equation (5) is accumulated on the image's own samples from
 //! tabulated potentials; P is read at the sample nearest to each atom, equation (6), and its gradient by
-//! centred differences. Cost: O(N) in image samples, some 8N additions in 2-D and 20N in 3-D.
+//! centred differences. Cost: O(N) in image samples, some 8N additions in the plane and 20N in space.
 //!
 //! Energy and gradient do not quite belong together: the energy is constant within a sample. Atoms count
-//! as if at their nearest samples, so what it errs by against the double sum is of first order in 1/d, d
-//! in samples: in a lattice at d = 8 the gradient, times d, by 0.1, half as much at 16; the energy of
-//! an atom by 0.004 and less, since errors of neighbouring pairs cancel in part. Atoms on the image's
+//! as if at their nearest samples, so the error against the double sum is of first order in 1/d, d in
+//! samples. In a lattice at d = 8 that of the gradient, times d, is 0.1, and half as much at d = 16; that of
+//! an atom's energy is 0.004 or less, since errors of neighbouring pairs cancel in part. Atoms on the image's
 //! boundary feel their own tables along its normal, where differences are one-sided.
 
 use std::ops::Range;
@@ -333,7 +333,7 @@ impl<const D: usize> Centres<D> {
 
 impl<const D: usize> Engine<D> for SampledEngine<'_, D> {
     fn prepare(&mut self, atoms: &[Point<D>], _next_move: f64) -> bool {
-        // The field is read anew at every evaluation; only the caller's view of d is refreshed here.
+        // The field is made again at every evaluation; only the caller's view of d is refreshed here.
         let first = self.distances.len() != atoms.len();
         let distance = self.fields.distance;
         atoms.par_iter().map(|p| distance.at(p)).collect_into_vec(&mut self.distances);

@@ -154,7 +154,7 @@ fn pairs_equal_the_double_sum<const D: usize>() {
                 &format!("{what}, moved a little"),
             );
 
-            // beyond it they are read anew
+            // beyond it they are read again
             let far = jolted(&scene.atoms, 1.0 * scene.distance.greatest(), 2);
             let changed = varying || matches!(weight, Weight::Field);
             assert_eq!(engine.prepare(&far, 0.1), changed, "{what}");
@@ -331,7 +331,7 @@ fn sampling_errors(d: f64) -> (f64, f64) {
 
 /// Atoms move to their nearest samples, by up to half a sample: φ and its slope, functions of r/d, then
 /// err by something proportional to 1/d, at random. In the energy of many atoms these cancel in part,
-/// since their mean is 0; what is left of second order in 1/d does not.
+/// since their mean is 0; the rest, of second order in 1/d, does not.
 #[test]
 fn what_the_sampled_engine_errs_by_halves_when_d_doubles() {
     let errors = [4.0, 8.0, 16.0].map(sampling_errors);

@@ -116,7 +116,7 @@ impl<const D: usize> Bounds<D> {
         self.freedom(p) == 0
     }
 
-    /// The area (2-D) or volume (3-D) of the box.
+    /// The area (plane) or volume (space) of the box.
     pub fn measure(&self) -> f64 {
         self.extent().iter().product()
     }

@@ -7,7 +7,7 @@ use rayon::prelude::*;
 /// it on are near each other, and so are eight such blocks, and eight of those: the set is halved across
 /// its longest side, at a power of two of blocks, and the halves again.
 ///
-/// Blocks are more compact than those of [`super::hilbert_order`]: what is looked for by boxes is found sooner.
+/// Blocks are more compact than those of [`super::hilbert_order`]: a search by boxes is faster.
 /// Points equal along an axis go by index. Coordinates are compared in single precision, in units of the
 /// points' extent. Cost: O(n log n).
 pub fn compact_order<const D: usize>(points: &[Point<D>]) -> Vec<u32> {

@@ -1,4 +1,4 @@
-//! Points along a Hilbert curve: what is near in memory is then near in space.
+//! Points along a Hilbert curve: those near in memory are then near each other.
 //!
 //! The bounding cube of the points is cut into 2^b cells a side and the cells are numbered along the
 //! curve (Hamilton 2006). Points of one cell follow each other in order of their coordinates, equal
@@ -9,7 +9,7 @@ use super::{Bounds, Point};
 use rayon::prelude::*;
 use std::cmp::Ordering;
 
-/// The bits of a whole key: 30 a coordinate in 2-D, 20 in 3-D.
+/// The bits of a whole key: 30 a coordinate in the plane, 20 in space.
 const KEY_BITS: usize = 60;
 
 /// The indices of `points` in the order in which a Hilbert curve through their bounding cube meets

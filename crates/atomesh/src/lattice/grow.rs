@@ -1,7 +1,7 @@
 //! Growing a lattice outward from a seed (Hale 2001, algorithm 2), boundary first.
 //!
 //! Assumes d(x) is smooth, |∇d| ≪ 1. Corners, then edges of the box, divided evenly in ∫dx/d; then, in
-//! 3-D, its faces, grown as hexagonal crystals from their centres, each as if the others were not there;
+//! space, its faces, grown as hexagonal crystals from their centres, each as if the others were not there;
 //! then the interior from the seeds, or from the centre, as the wanted crystal. Visits atoms breadth
 //! first, tries their ideal neighbour sites in crystal order, and takes a site if the ball of diameter
 //! γ d around it is free. Where growth could not pass, because the box is narrower than d there, it starts
@@ -263,7 +263,7 @@ impl<const D: usize> Growth<'_, D> {
                 continue;
             }
             let own = self.gamma * d;
-            // d is read at the site only where its atom's does not settle the matter
+            // d is read at the site only where the atom's own d does not decide
             let look = self.occupancy.look(&site, &(room * least..=room * greatest), own);
             if look == Look::Taken {
                 continue;

@@ -164,8 +164,8 @@ impl<const D: usize> Lattice<D> {
         self
     }
 
-    /// The same atoms along a Hilbert curve (see [`hilbert_order`]): what is near in memory is then near
-    /// in space, as all later work is fastest.
+    /// The same atoms along a Hilbert curve (see [`hilbert_order`]): atoms near each other are then near in
+    /// memory, where all later work is fastest.
     pub fn along_curve(self) -> Self {
         let order = hilbert_order(&self.atoms);
         self.reordered(&order)

@@ -43,7 +43,7 @@ pub(super) enum Look {
 
 const NONE: u32 = u32::MAX;
 
-/// Bounds are widened by this share, lest a rounding hides a ball.
+/// Bounds are widened by this share, so that no rounding hides a ball.
 const SLACK: f64 = 1e-6;
 
 #[derive(Clone, Copy)]

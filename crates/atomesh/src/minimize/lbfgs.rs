@@ -131,7 +131,7 @@ impl Lbfgs {
         }
     }
 
-    /// Forgets past steps and evaluates the function anew, as is due when the function has changed.
+    /// Forgets past steps and evaluates the function: due when it has changed.
     pub fn restart(&mut self, objective: &mut impl Objective) {
         self.spare.extend(self.history.drain(..));
         self.state.evaluate(objective);

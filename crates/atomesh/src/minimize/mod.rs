@@ -1,8 +1,8 @@
 //! Minimizing a smooth function of many variables, without knowing what it is.
 //!
-//! [`Lbfgs`] is the limited-memory BFGS method by its two-loop recursion (Byrd, Nocedal & Schnabel
-//! 1996); [`descend`] is plain steepest descent, the slow reference. Both work one iteration at a time, so that a caller
-//! can watch, cancel, or change the function in between.
+//! [`Lbfgs`] is the limited-memory BFGS method by its two-loop recursion (Byrd, Nocedal & Schnabel 1996);
+//! [`descend`] is plain steepest descent, the slow reference. Both work one iteration at a time, so that a
+//! caller can watch, cancel, or change the function in between.
 
 mod blocks;
 mod lbfgs;

@@ -18,8 +18,8 @@ pub(super) struct LatticeEnergy<'e, const D: usize> {
     margin: f64,
     /// The farthest an atom may go in any iteration, over its nominal distance.
     longest_move: f64,
-    /// The farthest it may go in the next one: twice the last move, since moves shrink towards a minimum
-    /// and the engine need not be ready for more.
+    /// The farthest it may go in the next one: at most twice the last move, since moves shrink towards a
+    /// minimum and the engine need not be ready for more.
     next_move: f64,
     /// The farthest that the last direction moves an atom, over its nominal distance.
     reach: f64,
@@ -79,7 +79,7 @@ impl<'e, const D: usize> LatticeEnergy<'e, D> {
         }
     }
 
-    /// Readies the engine for a first iteration from `z`; says whether the energy has become another
+    /// Readies the engine for a first iteration from `z`; returns whether the energy has become another
     /// function.
     pub fn prepare(&mut self, z: &[f64]) -> bool {
         self.prepare_for(z, self.longest_move)
@@ -102,7 +102,7 @@ impl<'e, const D: usize> LatticeEnergy<'e, D> {
         let mut gradient = vec![[0.0; D]; z.len() / D];
         self.place(z);
         let atoms = self.atoms.as_deref().unwrap_or(z.as_chunks().0);
-        self.engine.prepare(atoms, 1.0); // farther than any list reaches: all is read anew
+        self.engine.prepare(atoms, 1.0); // farther than any list reaches, so that all is read again
         self.engine.evaluate(atoms, &mut gradient)
     }
 

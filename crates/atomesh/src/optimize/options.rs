@@ -19,7 +19,7 @@ pub struct OptimizeOptions {
     pub perturbation: f64,
     /// The farthest that an iteration moves an atom, over its nominal distance. Default 0.1.
     pub longest_move: f64,
-    /// How near to a side of the box a free atom may come, over its nominal distance: what is nearer
+    /// The least distance of a free atom from a side of the box, over its nominal distance: nearer atoms
     /// would make flat cells. Default 0.35.
     pub margin: f64,
     /// Stages with a smoothed b(x) before the sharp one, 10 or less. Default 0.
@@ -74,9 +74,9 @@ pub enum OptimizeError {
 impl OptimizeOptions {
     /// The defaults for images of a dimension.
     ///
-    /// In 2-D the hexagonal lattice is a stable minimum of the pair potential, and the longer atoms
+    /// In the plane the hexagonal lattice is a stable minimum of the pair potential, and the longer atoms
     /// search, from a smoothed image to the sharp one, the better the mesh: fault images gain a tenth
-    /// to two fifths in alignment at nearly equal shape. In 3-D no lattice of that density is: a long search
+    /// to two fifths in alignment at nearly equal shape. In space no lattice of that density is: a long search
     /// lets it fall into disorder, with more alignment but flat cells, so it stops early, after one
     /// perturbation: on a brain at d = 6 a second one took a third more evaluations, for recall
     /// 0.638 against 0.635 and mean quality 0.870 against 0.873.

@@ -75,7 +75,7 @@ pub struct OptimizeReport {
 }
 
 impl OptimizeReport {
-    /// The report of a lattice that nobody has moved.
+    /// The report of a lattice that was not moved.
     pub fn new(engine: EngineKind) -> Self {
         Self { engine: Some(engine), ..Self::default() }
     }

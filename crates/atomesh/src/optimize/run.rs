@@ -68,15 +68,15 @@ impl<'r, const D: usize> Run<'r, D> {
         Ok(self.energy.into_lattice(&x))
     }
 
-    /// Evaluates the energy where the atoms start, and says where that is: those that were nearer to a side
-    /// than the margin have been moved.
+    /// Evaluates the energy where the atoms start, and returns that place: atoms nearer to a side than the
+    /// margin have been moved.
     pub(super) fn begin(&mut self) -> Vec<f64> {
         let given = self.minimizer.x().to_vec();
         self.minimizer.restart(&mut self.energy);
         self.stage.energy_first = self.minimizer.value();
         let start = self.minimizer.x().to_vec();
         if start != given {
-            // d, β and who is near whom were read before they were moved
+            // d, β and the lists were made before they were moved
             self.stage.energy_first = self.energy.evaluate_at(&start).total();
             self.minimizer.restart(&mut self.energy);
         }

@@ -2,12 +2,11 @@
 //!
 //! d and β are read at the atoms and kept until one has moved far, so that energy and gradient belong to
 //! one function and a line search can trust them. Lists reach farther than the cut-off by a skin and
-//! hold until an atom has moved half of it; a thin skin, made anew often, costs less than a thick one.
+//! hold until an atom has moved half of it; a thin skin, rebuilt often, costs less than a thick one.
 //!
-//! Lists are found in a tree of boxes over atoms of which those that follow each other are near each other.
-//! Where the caller's order is such ([`compact_order`]) it is taken as it is, and memory is read and
-//! written in runs; else the engine keeps an order of its own, and makes it anew once atoms have moved so
-//! much that the boxes have grown. Cost: O(n) in atoms.
+//! Lists are found in a tree of boxes over atoms in a compact order ([`compact_order`]). If the caller's
+//! order is compact it is kept, and memory is read and written in runs; else the engine keeps its own
+//! order, and renews it once atoms have moved so much that the boxes have grown. Cost: O(n) in atoms.
 
 mod gather;
 #[cfg(test)]
@@ -24,12 +23,12 @@ use super::neighbors::{CHUNK, NeighborLists};
 use super::pair;
 use super::tree::{Scaling, Tree};
 
-/// How far lists reach beyond the cut-off, in nominal distances, or farther if atoms are to move farther.
+/// How far lists reach beyond the cut-off, over the nominal distance; farther if a longer move is announced.
 const SKIN: f64 = 0.2;
-/// How far an atom may move, over its nominal distance, before d and β are read anew.
+/// How far an atom may move, over its nominal distance, before d and β are read again.
 const STALE: f64 = 0.25;
-/// How much the tree's boxes may grow before atoms are put in order anew, and how much larger than cubes of
-/// eight atoms they may be for the caller's order to be taken.
+/// How much the tree's boxes may grow before the order is renewed, and how much larger than cubes of eight
+/// atoms they may be for the caller's order to be kept.
 const LOOSE: f64 = 1.5;
 
 /// The engine that sums over pairs of near atoms, with an analytic gradient.
@@ -47,16 +46,18 @@ pub struct PairsEngine<'a, const D: usize> {
     place: Vec<u32>,
     lists: NeighborLists,
     skin: f64,
-    /// d at the atoms, β at them if it varies, where they were when these were read, if one varies, and
-    /// where they were when the lists were built.
+    /// d at the atoms.
     distances: Vec<f64>,
+    /// β at the atoms, if it varies.
     weights: Vec<f64>,
+    /// Where the atoms were when d and β were read, if one of these varies.
     read: Vec<Point<D>>,
+    /// Where they were when the lists were built.
     listed: Vec<Point<D>>,
     /// The gradient in the tree's order, where that is not the caller's.
     slopes: Vec<Point<D>>,
-    /// The samples around each atom, in the tree's order, where they were read last: most atoms stay in
-    /// their cell from one evaluation to the next, and these follow each other in memory.
+    /// The samples around each atom as last read, in the tree's order: most atoms stay in their cell of
+    /// samples from one evaluation to the next, and these follow each other in memory.
     held: Vec<HeldCell>,
 }
 
@@ -177,7 +178,7 @@ impl<const D: usize> Engine<D> for PairsEngine<'_, D> {
         if !loose {
             return false;
         }
-        // what cannot be told, or never happens, needs no room
+        // a move of a nominal distance or more never happens: no skin is made for it
         self.skin = if next_move < 1.0 { SKIN.max(2.0 * next_move) } else { SKIN };
         if stale {
             self.read_fields(atoms);

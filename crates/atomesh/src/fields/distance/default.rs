@@ -14,7 +14,7 @@ use crate::image::Grid;
 /// ```
 pub fn default_distance<const D: usize>(grid: &Grid<D>) -> f64 {
     let per_atom = if D <= 2 { 2.0 / 3f64.sqrt() / 1_500.0 } else { 0.75 * 3f64.sqrt() / 50_000.0 };
-    // logarithms, lest the product overflows; an axis of one sample is a step thick
+    // by logarithms, since the product may overflow; an axis of one sample is a step thick
     let extent = grid.bounds().extent();
     let log_measure: f64 = (0..D).map(|k| extent[k].max(grid.step[k]).ln()).sum();
     let distance = ((log_measure + f64::ln(per_atom)) / D as f64).exp();

@@ -1,9 +1,9 @@
 //! The nominal distance d(x): the edge length wanted at x.
 //!
 //! d is smooth, |∇d| ≪ 1 (Hale 2001, section 2.1), so it is kept on nodes half the least distance
-//! apart, much fewer than the image's samples, and interpolated linearly between them. Wherever it
-//! comes from, its slope is limited: d(x) ≤ d(y) + g |x − y|, by lowering it where it is too
-//! large. It never falls below its own minimum. Lengths are in lattice units.
+//! apart, far fewer than the image's samples, and interpolated linearly between them. Wherever it
+//! comes from, its slope is limited by g: it is lowered until d(x) ≤ d(y) + g |x − y| for all x and y,
+//! which leaves its minimum as it is. Lengths are in lattice units.
 
 mod coarse;
 mod default;
@@ -19,7 +19,7 @@ use rayon::prelude::*;
 pub use default::default_distance;
 pub use grading::{GradeBy, Grading, feature_density};
 
-/// Greatest slope of d where none is asked for, in lattice units of d per lattice unit of way.
+/// The default limit of the slope of d, in lattice units per lattice unit.
 ///
 /// Of the order of the paper's Fig. 5 (d from 6 to 18 within some 50 samples); neighbouring edges
 /// then differ by a quarter, which a lattice follows without defects.
@@ -325,7 +325,7 @@ fn least_length(field: &[f32]) -> Option<f32> {
     good.then_some(least)
 }
 
-/// Values that one thread looks at in a go.
+/// Values that one thread checks at a time.
 const BLOCK: usize = 1 << 16;
 
 /// The weight of node `i` of `n` in the trapezoidal rule.
