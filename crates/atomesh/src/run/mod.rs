@@ -52,7 +52,7 @@ use crate::region::{
     Outline, RegionError, Trimmed, fit_facets, join_islands, label_samples, outline_facets,
     smooth_outline, trim_to_outline,
 };
-use crate::sample::{SampleOptions, Statistic, sample_placed};
+use crate::sample::{SampleOptions, Statistic, sample_in_frame};
 use crate::voronoi::{sites_apart, voronoi};
 use crate::watch::{Phase, Watch, check};
 use rayon::prelude::*;
@@ -426,7 +426,7 @@ impl<const D: usize> Prepared<'_, D> {
         let frame = frame.expect("a grid has samples and steps above 0");
         let samples = Samples::I32(samples.to_vec());
         let options = SampleOptions::new(&[Statistic::Majority]);
-        let found = sample_placed(mesh, &frame, &samples, options, watch)?;
+        let found = sample_in_frame(mesh, &frame, &samples, options, watch)?;
         let mut labels: Vec<i32> = found.values[0].iter().map(|&label| label as i32).collect();
         join_islands(mesh, &mut labels, self.options.least_island);
         Ok(labels)
