@@ -31,7 +31,7 @@ impl Dimension<2> {
     /// Images of two axes.
     pub fn flat() -> Self {
         Self {
-            method: Method::flat(),
+            method: Method::plane(),
             draw: draw_flat,
             draw_cells: draw_polygons,
             draw_flow: |flow, style, flow_style| draw_flow(flow, style, flow_style),
@@ -49,7 +49,7 @@ impl Dimension<3> {
     /// Images of three axes; pictures show the three slices through the middle.
     pub fn volume() -> Self {
         Self {
-            method: Method::volume(),
+            method: Method::space(),
             draw: |image, mesh, style| {
                 let style = Style { atoms: true, ..style.clone() };
                 draw_slices(image, mesh, image.frame().shape().map(|n| n / 2), &style)

@@ -348,7 +348,7 @@ fn summary<const D: usize>(
 const SECONDS_PER_ATOM: [f64; 2] = [5e-5, 1.2e-5];
 
 fn expectation<const D: usize>(
-    prepared: &Prepared<'_, D>,
+    prepared: &Prepared<D>,
     dimension: &Dimension<D>,
     is_voronoi: bool,
 ) -> String {
