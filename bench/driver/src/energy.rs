@@ -3,8 +3,7 @@
 use std::f64::consts::SQRT_2;
 
 use atomesh::energy::{Engine, PairsEngine, SampledEngine};
-use atomesh::fields::NominalDistance;
-use atomesh::fields::{ImageWeight, Interpolation, ScalarField};
+use atomesh::fields::{FieldsView, ImageWeight, Interpolation, NominalDistance, ScalarField};
 use atomesh::geometry::{Point, compact_order};
 use atomesh::image::Grid;
 use atomesh::lattice::{Crystal, GrowOptions, grow};
@@ -68,11 +67,10 @@ impl Energy {
             Scene::Image => image()?,
             Scene::Crystal => crystal(self.side)?,
         };
+        let fields = FieldsView { potential: &potential, weight: &weight, distance: &distance };
         match self.engine {
-            Engines::Sampled => {
-                self.evaluate(SampledEngine::new(&potential, &weight, &distance), &atoms)
-            }
-            _ => self.evaluate(PairsEngine::new(&potential, &weight, &distance), &atoms),
+            Engines::Sampled => self.evaluate(SampledEngine::new(fields), &atoms),
+            _ => self.evaluate(PairsEngine::new(fields), &atoms),
         }
     }
 
@@ -110,7 +108,7 @@ fn image() -> Result<Scenery, Failure> {
     let crystal = Crystal::face_centered_cubic();
     let lattice = grow(&crystal, grid.bounds(), &distance, &GrowOptions::default(), &mut Silent)?;
     Ok(Scenery {
-        potential: ScalarField::new(grid, samples, Interpolation::Linear)?,
+        potential: ScalarField::potential(grid, samples, Interpolation::Linear)?,
         weight: ImageWeight::constant(0.5)?,
         distance,
         atoms: sorted(lattice.atoms()),
@@ -129,7 +127,11 @@ fn crystal(side: usize) -> Result<Scenery, Failure> {
         })
         .collect();
     Ok(Scenery {
-        potential: ScalarField::new(grid, vec![0.0; grid.sample_count()], Interpolation::Linear)?,
+        potential: ScalarField::potential(
+            grid,
+            vec![0.0; grid.sample_count()],
+            Interpolation::Linear,
+        )?,
         weight: ImageWeight::constant(0.0)?,
         distance: NominalDistance::constant(&grid, 1.0)?,
         atoms: sorted(&atoms),

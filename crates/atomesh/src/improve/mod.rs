@@ -13,7 +13,7 @@ mod plane;
 mod space;
 
 pub use plane::PlaneImprover;
-pub use space::Space;
+pub use space::SpaceImprover;
 
 use crate::fields::FieldsView;
 use crate::mesh::{Mesh, MeshError};
@@ -34,7 +34,8 @@ pub enum Align {
 }
 
 /// How a mesh is improved.
-#[derive(Clone, Debug, PartialEq)]
+#[derive(Clone, Debug, PartialEq, serde::Serialize, serde::Deserialize)]
+#[serde(deny_unknown_fields)]
 pub struct ImproveOptions {
     /// Which means are used.
     pub align: Align,

@@ -131,6 +131,16 @@ impl<const D: usize> Lattice<D> {
         (0..self.len()).map(one).collect()
     }
 
+    /// The axes along which the box alone lets atom `i` move, as bits.
+    pub(crate) fn freedom_in_box(&self, i: usize) -> u8 {
+        self.freedom[i]
+    }
+
+    /// The temperature of atom `i`, 0 (frozen) to 1 (free).
+    pub fn temperature(&self, i: usize) -> f32 {
+        self.temperature[i]
+    }
+
     /// Sets the temperature of atom `i`, 0 (frozen) to 1 (free): its variables are scaled by it, so
     /// that the gradient stays a gradient (Hale 2002).
     ///
