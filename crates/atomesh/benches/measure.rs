@@ -71,7 +71,7 @@ fn measures(criterion: &mut Criterion) {
     let image = Samples::F32(potential);
     group.bench_function("sample", |b| {
         let options = SampleOptions::new(&[Statistic::Mean, Statistic::Total]);
-        b.iter(|| sample_placed(&mesh, (&frame, &image), options, &mut Silent));
+        b.iter(|| sample_placed(&mesh, &frame, &image, options, &mut Silent));
     });
     group.bench_function("fidelity", |b| {
         b.iter(|| fidelity(&mesh, (&frame, &image), &mut Silent));

@@ -33,7 +33,8 @@ pub enum Align {
 }
 
 /// How a mesh is improved.
-#[derive(Clone, Debug, PartialEq)]
+#[derive(Clone, Debug, PartialEq, serde::Serialize, serde::Deserialize)]
+#[serde(deny_unknown_fields)]
 pub struct ImproveOptions {
     /// What is done.
     pub align: Align,
