@@ -45,11 +45,15 @@ impl<const D: usize> Bins<D> {
     pub fn remove(&mut self, number: usize, p: &Point<D>) {
         let cube = self.index(&self.cube(p));
         let after = self.next[number];
-        let mut link = &mut self.heads[cube];
-        while *link != NONE && *link as usize != number {
-            link = &mut self.next[*link as usize];
+        let mut at = self.heads[cube] as usize;
+        if at == number {
+            self.heads[cube] = after;
+            return;
         }
-        *link = after;
+        while self.next[at] as usize != number {
+            at = self.next[at] as usize;
+        }
+        self.next[at] = after;
     }
 
     /// Adds a point again that has been taken out, at `p`.

@@ -4,8 +4,8 @@ use crate::geometry::Bounds;
 use crate::image::{Frame, Grid, Samples};
 use crate::measure::{
     AlignmentOptions, AlignmentReport, FidelityReport, HomogeneityReport, MeasureError,
-    PrecisionOptions, SampledPotential, ShapeReport, SpreadReport, WantedSize, alignment, alignment_of_faces, features,
-    fidelity, precision, shape, spread,
+    PrecisionOptions, SampledPotential, ShapeReport, SpreadReport, WantedSize, alignment,
+    alignment_of_faces, features, fidelity, precision, shape, spread,
 };
 use crate::mesh::{Mesh, PolyReport};
 use crate::watch::Watch;

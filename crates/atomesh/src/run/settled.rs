@@ -4,9 +4,7 @@ use crate::lattice::{Lattice, Outlined};
 use crate::mesh::{Mesh, merge_duplicates};
 use crate::mirror::MirrorReport;
 use crate::optimize::OptimizeReport;
-use crate::region::{
-    Outline, RegionError, Trimmed, fit_facets, smooth_outline, trim_to_outline,
-};
+use crate::region::{Outline, RegionError, Trimmed, fit_facets, smooth_outline, trim_to_outline};
 use crate::voronoi::{sites_apart, voronoi};
 use crate::watch::Watch;
 
