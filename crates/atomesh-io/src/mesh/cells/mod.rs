@@ -19,8 +19,9 @@ pub use raw::CellReadError;
 pub use read::{AnyCells, LoadedCells, read_cells};
 pub use vtu::{write_cells_vtu, write_cells_vtu_with};
 
+use atomesh::features::FeatureFaces;
 use atomesh::image::Frame;
-use atomesh::voronoi::{FeatureFaces, PolyMesh};
+use atomesh::mesh::PolyMesh;
 
 use super::provenance::Provenance;
 

@@ -8,10 +8,11 @@
 use std::collections::BTreeMap;
 use std::path::Path;
 
+use atomesh::features::FeatureFaces;
 use atomesh::geometry::{Bounds, Point};
 use atomesh::image::{Frame, Units};
-use atomesh::mesh::Delaunay;
-use atomesh::voronoi::{FeatureFaces, PolyMesh, voronoi};
+use atomesh::mesh::{Delaunay, PolyMesh};
+use atomesh::voronoi::voronoi;
 use atomesh::watch::Watch;
 
 use super::super::field::OwnedField;
