@@ -21,7 +21,7 @@ pub fn read(path: &Path) -> Result<AnyMesh, Failure> {
     }
     read_mesh(path).map_err(|e| match e {
         MeshReadError::Format(_) => {
-            let known = atomesh_io::mesh::MeshFormat::EXTENSIONS;
+            let known = atomesh_io::mesh::MeshFormat::endings();
             let message = format!("the ending says no mesh format; expected one of {known}");
             Failure::misuse(message).about(path)
         }

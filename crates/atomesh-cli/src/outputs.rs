@@ -11,10 +11,11 @@ use atomesh::watch::{Phase, Watch};
 use atomesh_draw::{PictureFormat, Style};
 use atomesh_io::atomic_file::AtomicFile;
 use atomesh_io::image::{ImageFormat, WriteReason, write_image};
-use atomesh_io::mesh::cells::{CellData, ConnectionFiles, poly_mesh_of, write_connections};
+use atomesh_io::mesh::cells::{
+    CellData, ConnectionFiles, foam_mesh_of, write_cells_vtu, write_connections,
+};
 use atomesh_io::mesh::msh::MshVersion;
-use atomesh_io::mesh::polymesh::{check_poly_mesh_writable, write_poly_mesh};
-use atomesh_io::mesh::vtu::write_cells_vtu;
+use atomesh_io::mesh::openfoam::{check_foam_mesh_writable, write_foam_mesh};
 use atomesh_io::mesh::{MeshData, MeshFormat, MeshWriteError, Provenance, write_mesh_as};
 
 use crate::dimension::Dimension;
@@ -73,7 +74,7 @@ impl Format {
             };
         }
         let format =
-            MeshFormat::of(mesh).map_err(|_| unknown_ending(mesh, MeshFormat::EXTENSIONS))?;
+            MeshFormat::of(mesh).map_err(|_| unknown_ending(mesh, &MeshFormat::endings()))?;
         let Some(version) = msh else { return Ok(Self::Simplices(format)) };
         match format {
             MeshFormat::Msh(_, encoding) => {
@@ -98,7 +99,7 @@ impl Format {
         match self {
             Self::Simplices(format) => format.check_writable(path),
             Self::CellsVtu => AtomicFile::create(path).map(drop),
-            Self::CellsFoam => check_poly_mesh_writable(path),
+            Self::CellsFoam => check_foam_mesh_writable(path),
         }
     }
 }
@@ -312,8 +313,8 @@ impl Outputs {
         let data = CellData { mesh: &mesh, features: &features, frame, provenance };
         let written = match self.mesh_format {
             Format::CellsFoam => {
-                let mesh = poly_mesh_of(&data).map_err(Failure::content)?;
-                write_poly_mesh(&self.mesh, &mesh, watch)
+                let mesh = foam_mesh_of(&data).map_err(Failure::content)?;
+                write_foam_mesh(&self.mesh, &mesh, watch)
             }
             _ => (|| {
                 let mut file = AtomicFile::create(&self.mesh)?;
@@ -407,10 +408,9 @@ pub fn unknown_ending(path: &Path, known: &str) -> Failure {
 
 /// Checks that a file's ending promises a format that holds single precision.
 pub fn check_potential(path: &Path) -> Result<(), Failure> {
-    use ImageFormat::{Nifti, NiftiGz, Npy, Nrrd, Raw, Tiff, Vti};
     match ImageFormat::from_path(path) {
-        Some(Npy | Nifti | NiftiGz | Nrrd | Vti | Tiff | Raw) => Ok(()),
-        _ => Err(unknown_ending(path, ".npy, .nii, .nii.gz, .nrrd, .vti, .tif, .raw")),
+        Some(format) if format.writes_floats() => Ok(()),
+        _ => Err(unknown_ending(path, &ImageFormat::usual_written_endings(", ", true))),
     }
 }
 

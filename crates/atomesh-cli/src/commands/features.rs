@@ -147,8 +147,10 @@ fn check_outputs(args: &FeaturesArgs) -> Result<Option<SurfaceFormat>, Failure> 
     if let Some(path) = &args.mesh_output {
         let known = MeshFormat::of(path).ok().filter(|format| format.holds_tags());
         let Some(known) = known else {
-            let message = "the ending says no mesh format that holds tags; \
-                 expected one of .vtu, .msh, .msh2, .inp, polyMesh";
+            let message = format!(
+                "the ending says no mesh format that holds tags; expected one of {}",
+                MeshFormat::tag_endings()
+            );
             return Err(Failure::misuse(message).about(path));
         };
         known

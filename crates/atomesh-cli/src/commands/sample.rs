@@ -98,7 +98,7 @@ impl FromStr for NamedImage {
 /// [`Failure`] if a file cannot be used, options make no sense, or the user ends the work.
 pub fn run(args: &SampleArgs, watch: &mut Progress) -> Result<String, Failure> {
     if MeshFormat::of(&args.output).is_err() {
-        let known = MeshFormat::EXTENSIONS;
+        let known = MeshFormat::endings();
         let message = format!("the ending says no format; expected one of {known}");
         return Err(Failure::misuse(message).about(&args.output));
     }

@@ -63,14 +63,13 @@ fn scene() -> impl TypedValueParser<Value = Scene> {
 /// # Errors
 /// [`Failure`] if an option is out of its range or a file cannot be written.
 pub fn run(args: &SynthArgs, watch: &mut Progress) -> Result<String, Failure> {
-    use ImageFormat::{Nifti, NiftiGz, Npy, Nrrd, Png, Raw, Tiff, Vti};
-    let format = ImageFormat::from_path(&args.output);
-    if !matches!(format, Some(Png | Npy | Nifti | NiftiGz | Nrrd | Vti | Tiff | Raw)) {
-        let message = "the ending says no format that is written; \
-             expected one of .png, .npy, .nii, .nii.gz, .nrrd, .vti, .tif, .raw";
+    let format = ImageFormat::from_path(&args.output).filter(|format| format.is_written());
+    if format.is_none() {
+        let known = ImageFormat::usual_written_endings(", ", false);
+        let message = format!("the ending says no format that is written; expected one of {known}");
         return Err(Failure::misuse(message).about(&args.output));
     }
-    let bytes = args.bytes || format == Some(Png);
+    let bytes = args.bytes || format == Some(ImageFormat::PNG);
     match args.scene.dimension() {
         2 => draw::<2>(args, 256, bytes, watch),
         _ => draw::<3>(args, 96, bytes, watch),

@@ -7,8 +7,8 @@ use atomesh::watch::Phase;
 use atomesh_draw::PictureFormat;
 use atomesh_flow::streamlines::{Porosity, Streamline, TraceOptions, time_of_flight, trace};
 use atomesh_io::atomic_file::AtomicFile;
-use atomesh_io::mesh::cells::CellData;
-use atomesh_io::mesh::vtu::{write_broken_vtu, write_cells_vtu_with};
+use atomesh_io::mesh::cells::{CellData, write_cells_vtu_with};
+use atomesh_io::mesh::vtu::write_broken_vtu;
 use atomesh_io::mesh::{
     CellFields, FacetFlux, FluxFiles, FluxTable, MeshData, MeshFormat, MeshWriteError, Streamlines,
     write_fluxes, write_mesh, write_streamlines,
@@ -57,7 +57,7 @@ impl Files {
         ending(&options.streamlines, ".vtp", &["vtp"])?;
         ending(&options.fluxes, ".json", &["json"])?;
         if let Some(path) = &options.output {
-            MeshFormat::of(path).map_err(|_| unknown_ending(path, MeshFormat::EXTENSIONS))?;
+            MeshFormat::of(path).map_err(|_| unknown_ending(path, &MeshFormat::endings()))?;
         }
         let picture = picture_file(options.picture.as_deref())?;
         let files = Self {

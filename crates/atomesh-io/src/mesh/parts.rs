@@ -1,83 +1,12 @@
-//! What all mesh readers share: errors, places in the bytes, and the step from cells to a mesh.
+//! The step from a file's points and cells to a mesh, which all readers share.
 
-use std::io;
+use atomesh::mesh::{Mesh, Tags};
 
-use atomesh::mesh::{Mesh, MeshError, Tags, TagsError};
-
-use super::UnknownMeshFormat;
-use super::data::{AnyMesh, LoadedMesh, OwnedField};
+use super::field::OwnedField;
+use super::loaded::{AnyMesh, LoadedMesh};
 use super::metadata::Metadata;
+use super::read_error::MeshReadError;
 use super::tags::RawTags;
-
-/// Why a mesh was not read.
-#[derive(Debug, thiserror::Error)]
-#[non_exhaustive]
-pub enum MeshReadError {
-    /// The name calls for no known format.
-    #[error(transparent)]
-    Format(#[from] UnknownMeshFormat),
-    /// The system did not give the bytes.
-    #[error("the mesh could not be read: {0}")]
-    Io(#[from] io::Error),
-    /// The bytes are not what the format says.
-    #[error("byte {at}: expected {expected}, found {found}")]
-    Malformed {
-        /// Where, counted from the start of the file.
-        at: usize,
-        /// What the format says.
-        expected: String,
-        /// What is there.
-        found: String,
-    },
-    /// The file is of a kind that is not read.
-    #[error("{what} {found:?} is not supported; expected {expected}")]
-    Unsupported {
-        /// What is of that kind.
-        what: &'static str,
-        /// The kind.
-        found: String,
-        /// The kinds that are read.
-        expected: &'static str,
-    },
-    /// There are neither triangles nor tetrahedra.
-    #[error("there are no triangles or tetrahedra among {skipped} cells of other types")]
-    NoCells {
-        /// The number of cells of other types.
-        skipped: usize,
-    },
-    /// A mesh of triangles alone that is no plane of constant z.
-    #[error("the triangles have z from {min} to {max}; expected one z, or tetrahedra")]
-    NotFlat {
-        /// The least z.
-        min: f64,
-        /// The greatest z.
-        max: f64,
-    },
-    /// The cells or points are not valid.
-    #[error(transparent)]
-    Mesh(#[from] MeshError),
-    /// The groups of facets or cells are not valid.
-    #[error(transparent)]
-    Tags(#[from] TagsError),
-}
-
-/// An error at a place in the file.
-pub(super) fn malformed(
-    at: usize,
-    expected: impl Into<String>,
-    found: impl Into<String>,
-) -> MeshReadError {
-    MeshReadError::Malformed { at, expected: expected.into(), found: found.into() }
-}
-
-/// At most 24 bytes of what is at a place, for messages.
-pub(super) fn excerpt(bytes: &[u8], at: usize) -> String {
-    let rest = bytes.get(at..).unwrap_or_default();
-    if rest.is_empty() {
-        return "the end".into();
-    }
-    format!("\"{}\"", rest[..rest.len().min(24)].escape_ascii())
-}
 
 /// A file's points and cells before its dimension is known.
 #[derive(Debug, Default)]
@@ -160,13 +89,13 @@ impl Parts {
             *n = place as u32; // there are fewer than 2^32 points
         }
         for corner in cells.iter_mut() {
-            // a corner that is no point stays one that is none
+            // a corner that names no point keeps naming none
             *corner = number.get(*corner as usize).copied().unwrap_or(u32::MAX);
         }
         let is_kept = |i: usize| number[i] != u32::MAX;
         let mut at = 0..;
         self.points.retain(|_| at.next().is_some_and(is_kept));
-        // facets of groups that lose a corner are none of the mesh, and are left out later
+        // facets that lose a corner are not the mesh's, and are left out later
         let renumber = |c: &mut u32| *c = number.get(*c as usize).copied().unwrap_or(u32::MAX);
         self.tags.edges.iter_mut().for_each(|(edge, _)| edge.iter_mut().for_each(renumber));
         self.tags.triangles.iter_mut().for_each(|(t, _)| t.iter_mut().for_each(renumber));
@@ -198,7 +127,7 @@ impl Parts {
             (min, max) = (min.min(p[2]), max.max(p[2]));
             size = size.max(p[0].abs()).max(p[1].abs());
         }
-        // what is left of a rotation in double precision, and of text with ten digits
+        // the tolerance covers a rotation in double precision, and text with ten digits
         if max - min > 1e-9 * size {
             return Err(MeshReadError::NotFlat { min, max });
         }

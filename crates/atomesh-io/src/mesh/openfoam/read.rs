@@ -4,8 +4,8 @@ use std::fs;
 use std::path::Path;
 use std::str::FromStr;
 
-use super::super::read::{MeshReadError, excerpt, malformed};
-use super::{Beyond, CellZone, FaceZone, Patch, PolyMesh, PolyMeshError};
+use super::super::read_error::{MeshReadError, excerpt, malformed};
+use super::{Beyond, CellZone, FaceZone, FoamMesh, FoamMeshError, Patch};
 
 /// Reads the cells in a polyMesh folder, as text; zones may be missing. Patches of other types than
 /// `empty` are taken as plain ones.
@@ -13,7 +13,7 @@ use super::{Beyond, CellZone, FaceZone, Patch, PolyMesh, PolyMeshError};
 /// # Errors
 /// [`MeshReadError`] if a file is missing, binary, or not what OpenFOAM's format says; the place is that
 /// in the file that is named.
-pub fn read_poly_mesh(folder: &Path) -> Result<PolyMesh, MeshReadError> {
+pub fn read_foam_mesh(folder: &Path) -> Result<FoamMesh, MeshReadError> {
     let points_file = fs::read(folder.join("points"))?;
     let points = File::new("points", &points_file)?.list(point)?;
     let (faces, owner) = (fs::read(folder.join("faces"))?, fs::read(folder.join("owner"))?);
@@ -30,7 +30,7 @@ pub fn read_poly_mesh(folder: &Path) -> Result<PolyMesh, MeshReadError> {
     }
     let cell_count = owners.iter().chain(&neighbours).max().map_or(0, |&cell| cell as usize + 1);
     let names = patches.iter().map(|(patch, ..)| patch.clone()).collect();
-    let mut mesh = PolyMesh::new(points, cell_count, names).with_note(&comment(&points_file));
+    let mut mesh = FoamMesh::new(points, cell_count, names).with_note(&comment(&points_file));
     for (at, (corners, &owner)) in faces.iter().zip(&owners).enumerate() {
         let holds =
             |(_, start, count): &(Patch, usize, usize)| (*start..start + count).contains(&at);
@@ -53,7 +53,7 @@ pub fn read_poly_mesh(folder: &Path) -> Result<PolyMesh, MeshReadError> {
     Ok(mesh)
 }
 
-fn wrong(error: PolyMeshError) -> MeshReadError {
+fn wrong(error: FoamMeshError) -> MeshReadError {
     malformed(0, "files that agree", error.to_string())
 }
 

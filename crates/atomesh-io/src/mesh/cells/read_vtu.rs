@@ -1,18 +1,18 @@
 //! Reading the sites and fields of polygons and polyhedra.
 
-use super::super::cells::RawCells;
-use super::super::data::OwnedField;
+use super::super::field::OwnedField;
 use super::super::metadata::{self, Metadata};
-use super::super::read::{MeshReadError, malformed};
-use super::array::Array;
-use super::read::Document;
+use super::super::read_error::{MeshReadError, malformed};
+use super::super::vtu::array::Array;
+use super::super::vtu::read::Document;
+use super::raw::RawCells;
 
 /// VTK's numbers for a polygon and a polyhedron.
 const POLYGON: u32 = 7;
 const POLYHEDRON: u32 = 42;
 
 /// Reads what a VTU file of Voronoi cells says of them, its corners and faces apart.
-pub(in crate::mesh) fn read_cells_vtu(bytes: &[u8]) -> Result<RawCells, MeshReadError> {
+pub(super) fn read_cells_vtu(bytes: &[u8]) -> Result<RawCells, MeshReadError> {
     let document = Document::parse(bytes, "UnstructuredGrid")?;
     let [piece] = &document.pieces[..] else {
         return Err(malformed(0, "one piece", document.pieces.len().to_string()));

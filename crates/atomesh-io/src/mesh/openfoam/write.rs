@@ -6,8 +6,8 @@ use std::path::Path;
 
 use atomesh::watch::{Phase, Watch, check};
 
-use super::super::MeshWriteError;
-use super::{Beyond, FILES, Patch, PolyMesh};
+use super::super::error::MeshWriteError;
+use super::{Beyond, FILES, FoamMesh, Patch};
 use crate::atomic_file::AtomicFile;
 
 /// Bytes gathered before they are handed on.
@@ -22,9 +22,9 @@ const LINES_PER_STEP: usize = 1 << 18;
 /// # Errors
 /// If there are more faces than OpenFOAM's 32-bit labels can name, the folder or a file cannot be written,
 /// or the watch ends the work.
-pub fn write_poly_mesh(
+pub fn write_foam_mesh(
     folder: &Path,
-    mesh: &PolyMesh,
+    mesh: &FoamMesh,
     watch: &mut dyn Watch,
 ) -> Result<(), MeshWriteError> {
     let count = mesh.points().len().max(mesh.face_count()).max(mesh.corners.len());
@@ -43,11 +43,11 @@ pub fn write_poly_mesh(
     written
 }
 
-/// Tries whether [`write_poly_mesh`] could write into a folder, and leaves nothing behind.
+/// Tries whether [`write_foam_mesh`] could write into a folder, and leaves nothing behind.
 ///
 /// # Errors
 /// If the folder's parent does not exist, the name is a file's, or a file could not be written.
-pub fn check_poly_mesh_writable(folder: &Path) -> io::Result<()> {
+pub fn check_foam_mesh_writable(folder: &Path) -> io::Result<()> {
     if folder.is_dir() {
         return FILES.iter().try_for_each(|name| AtomicFile::create(&folder.join(name)).map(drop));
     }
@@ -59,7 +59,7 @@ pub fn check_poly_mesh_writable(folder: &Path) -> io::Result<()> {
 
 fn write_files(
     folder: &Path,
-    mesh: &PolyMesh,
+    mesh: &FoamMesh,
     watch: &mut dyn Watch,
 ) -> Result<(), MeshWriteError> {
     let mut finished = Vec::new();
@@ -125,7 +125,7 @@ impl Lines<'_> {
     }
 }
 
-fn points(to: &mut Lines, mesh: &PolyMesh) -> Result<(), MeshWriteError> {
+fn points(to: &mut Lines, mesh: &FoamMesh) -> Result<(), MeshWriteError> {
     if !mesh.note.is_empty() {
         to.line(format_args!("// {}", mesh.note))?;
     }
@@ -137,7 +137,7 @@ fn points(to: &mut Lines, mesh: &PolyMesh) -> Result<(), MeshWriteError> {
     to.line(format_args!(")"))
 }
 
-fn faces(to: &mut Lines, mesh: &PolyMesh) -> Result<(), MeshWriteError> {
+fn faces(to: &mut Lines, mesh: &FoamMesh) -> Result<(), MeshWriteError> {
     to.head("faceList", "faces", "")?;
     to.line(format_args!("{}\n(", mesh.face_count()))?;
     for face in 0..mesh.face_count() {
@@ -154,17 +154,17 @@ fn faces(to: &mut Lines, mesh: &PolyMesh) -> Result<(), MeshWriteError> {
 }
 
 /// How many faces lie between cells; they come first.
-fn inner_count(mesh: &PolyMesh) -> usize {
+fn inner_count(mesh: &FoamMesh) -> usize {
     mesh.beyond.partition_point(|beyond| matches!(beyond, Beyond::Cell(_)))
 }
 
-fn counts(mesh: &PolyMesh) -> String {
+fn counts(mesh: &FoamMesh) -> String {
     let (points, faces) = (mesh.points.len(), mesh.face_count());
     let (cells, inner) = (mesh.cell_count, inner_count(mesh));
     format!("nPoints:{points}  nCells:{cells}  nFaces:{faces}  nInternalFaces:{inner}")
 }
 
-fn owners(to: &mut Lines, mesh: &PolyMesh) -> Result<(), MeshWriteError> {
+fn owners(to: &mut Lines, mesh: &FoamMesh) -> Result<(), MeshWriteError> {
     to.head("labelList", "owner", &counts(mesh))?;
     to.line(format_args!("{}\n(", mesh.face_count()))?;
     for owner in &mesh.owners {
@@ -173,7 +173,7 @@ fn owners(to: &mut Lines, mesh: &PolyMesh) -> Result<(), MeshWriteError> {
     to.line(format_args!(")"))
 }
 
-fn neighbours(to: &mut Lines, mesh: &PolyMesh) -> Result<(), MeshWriteError> {
+fn neighbours(to: &mut Lines, mesh: &FoamMesh) -> Result<(), MeshWriteError> {
     to.head("labelList", "neighbour", &counts(mesh))?;
     to.line(format_args!("{}\n(", inner_count(mesh)))?;
     for beyond in &mesh.beyond {
@@ -184,7 +184,7 @@ fn neighbours(to: &mut Lines, mesh: &PolyMesh) -> Result<(), MeshWriteError> {
     to.line(format_args!(")"))
 }
 
-fn boundary(to: &mut Lines, mesh: &PolyMesh) -> Result<(), MeshWriteError> {
+fn boundary(to: &mut Lines, mesh: &FoamMesh) -> Result<(), MeshWriteError> {
     to.head("polyBoundaryMesh", "boundary", "")?;
     to.line(format_args!("{}\n(", mesh.patches.len()))?;
     let mut start = inner_count(mesh);
@@ -200,7 +200,7 @@ fn boundary(to: &mut Lines, mesh: &PolyMesh) -> Result<(), MeshWriteError> {
     to.line(format_args!(")"))
 }
 
-fn face_zones(to: &mut Lines, mesh: &PolyMesh) -> Result<(), MeshWriteError> {
+fn face_zones(to: &mut Lines, mesh: &FoamMesh) -> Result<(), MeshWriteError> {
     to.head("regIOobject", "faceZones", "")?;
     to.line(format_args!("{}\n(", mesh.face_zones.len()))?;
     for zone in &mesh.face_zones {
@@ -219,7 +219,7 @@ fn face_zones(to: &mut Lines, mesh: &PolyMesh) -> Result<(), MeshWriteError> {
     to.line(format_args!(")"))
 }
 
-fn cell_zones(to: &mut Lines, mesh: &PolyMesh) -> Result<(), MeshWriteError> {
+fn cell_zones(to: &mut Lines, mesh: &FoamMesh) -> Result<(), MeshWriteError> {
     to.head("regIOobject", "cellZones", "")?;
     to.line(format_args!("{}\n(", mesh.cell_zones.len()))?;
     for zone in &mesh.cell_zones {

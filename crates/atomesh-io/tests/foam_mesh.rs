@@ -4,8 +4,8 @@ use atomesh::geometry::Bounds;
 use atomesh::mesh::{Delaunay, FacetGroup, Mesh, Regions, Tags};
 use atomesh::watch::Silent;
 use atomesh_io::mesh::MeshData;
-use atomesh_io::mesh::polymesh::{
-    Beyond, Patch, PolyMesh, PolyMeshError, read_poly_mesh, write_poly_mesh,
+use atomesh_io::mesh::openfoam::{
+    Beyond, FoamMesh, FoamMeshError, Patch, read_foam_mesh, write_foam_mesh,
 };
 
 /// A box of points in rows, 0 to `n` along every axis, shifted inside so that no two cells are alike.
@@ -43,7 +43,7 @@ fn tags<const D: usize>(mesh: &Mesh<D>) -> Tags<D> {
 }
 
 /// The normal of a face, its length the area: the sum of the cross products from the first corner.
-fn area(mesh: &PolyMesh, corners: &[u32]) -> [f64; 3] {
+fn area(mesh: &FoamMesh, corners: &[u32]) -> [f64; 3] {
     let at = |k: usize| mesh.points()[corners[k] as usize];
     let mut sum = [0.0; 3];
     for k in 1..corners.len() - 1 {
@@ -57,7 +57,7 @@ fn area(mesh: &PolyMesh, corners: &[u32]) -> [f64; 3] {
 }
 
 /// Volume by the divergence theorem over the outer faces: a third of the sum of x · area.
-fn volume(mesh: &PolyMesh) -> f64 {
+fn volume(mesh: &FoamMesh) -> f64 {
     let outer = (0..mesh.face_count()).map(|face| mesh.face(face));
     let outer = outer.filter(|(_, _, beyond)| matches!(beyond, Beyond::Patch(_)));
     outer
@@ -68,19 +68,19 @@ fn volume(mesh: &PolyMesh) -> f64 {
         .sum()
 }
 
-fn written_and_read<const D: usize>(mesh: &Mesh<D>) -> PolyMesh {
+fn written_and_read<const D: usize>(mesh: &Mesh<D>) -> FoamMesh {
     let tags = tags(mesh);
-    let made = PolyMesh::of_mesh(&MeshData::new(mesh).with_tags(&tags)).unwrap();
+    let made = FoamMesh::of_mesh(&MeshData::new(mesh).with_tags(&tags)).unwrap();
     made.validate().unwrap();
     let folder = tempfile::tempdir().unwrap();
     let path = folder.path().join("polyMesh");
-    write_poly_mesh(&path, &made, &mut Silent).unwrap();
-    let read = read_poly_mesh(&path).unwrap();
+    write_foam_mesh(&path, &made, &mut Silent).unwrap();
+    let read = read_foam_mesh(&path).unwrap();
     assert_eq!(read, made.ordered());
     read.validate().unwrap();
     // written over itself, it stays the same
-    write_poly_mesh(&path, &read, &mut Silent).unwrap();
-    assert_eq!(read_poly_mesh(&path).unwrap(), read);
+    write_foam_mesh(&path, &read, &mut Silent).unwrap();
+    assert_eq!(read_foam_mesh(&path).unwrap(), read);
     read
 }
 
@@ -137,7 +137,7 @@ fn a_flat_mesh_becomes_one_layer_of_prisms() {
 #[test]
 fn wrong_faces_are_refused_by_name() {
     let points = vec![[0.0; 3], [1.0, 0.0, 0.0], [0.0, 1.0, 0.0], [0.0, 0.0, 1.0]];
-    let empty = || PolyMesh::new(points.clone(), 1, vec![Patch::new("hull")]);
+    let empty = || FoamMesh::new(points.clone(), 1, vec![Patch::new("hull")]);
     let wrong = |corners: &[u32], owner, beyond| {
         empty().push_face(corners, owner, beyond).unwrap_err().to_string()
     };
@@ -146,12 +146,12 @@ fn wrong_faces_are_refused_by_name() {
     assert_eq!(wrong(&[0, 1, 2], 1, Beyond::Patch(0)), "face 0 names cell 1; there are 1");
     assert_eq!(wrong(&[0, 1, 2], 0, Beyond::Patch(1)), "face 0 names patch 1; there are 1");
     assert_eq!(wrong(&[0, 1, 2], 0, Beyond::Cell(0)), "face 0 has cell 0 on both sides");
-    assert_eq!(empty().validate(), Err(PolyMeshError::NoFaces { cell: 0 }));
+    assert_eq!(empty().validate(), Err(FoamMeshError::NoFaces { cell: 0 }));
     let mut open = empty();
     for face in [[0, 2, 1], [0, 1, 3], [0, 3, 2]] {
         open.push_face(&face, 0, Beyond::Patch(0)).unwrap();
     }
-    assert_eq!(open.validate(), Err(PolyMeshError::Open { cell: 0, edge: [1, 2] }));
+    assert_eq!(open.validate(), Err(FoamMeshError::Open { cell: 0, edge: [1, 2] }));
     open.push_face(&[1, 2, 3], 0, Beyond::Patch(0)).unwrap();
     assert_eq!(open.validate(), Ok(()));
 }

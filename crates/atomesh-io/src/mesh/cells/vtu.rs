@@ -6,10 +6,11 @@ use atomesh::mesh::PolyMesh;
 use atomesh::watch::Watch;
 
 use super::super::cell_fields::CellFields;
-use super::super::cells::CellData;
 use super::super::column::{Column, Endian};
-use super::super::{MeshWriteError, metadata};
-use super::appended::Head;
+use super::super::error::MeshWriteError;
+use super::super::metadata;
+use super::super::vtu::appended::Head;
+use super::CellData;
 
 /// VTK's numbers for a polygon and a polyhedron.
 const POLYGON: u8 = 7;
@@ -29,8 +30,8 @@ pub fn write_cells_vtu<const D: usize>(
     write_cells_vtu_with(out, data, &CellFields::new(data.mesh.cell_count()), watch)
 }
 
-/// Writes polygons or polyhedra with what is known of each, as cell data: for that of polyhedra meshio 5 refuses
-/// the file; ParaView reads it.
+/// Writes polygons or polyhedra with fields, as cell data. ParaView reads them; of polyhedra meshio 5 refuses
+/// cell data.
 ///
 /// # Errors
 /// As [`write_cells_vtu`].

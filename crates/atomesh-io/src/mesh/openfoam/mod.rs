@@ -1,7 +1,7 @@
 //! polyMesh, OpenFOAM's format: a folder of text files with the faces of cells of any shape.
 //!
-//! [`PolyMesh`] is the general form, points, faces as loops of them, and the cells that own the faces;
-//! [`PolyMesh::of_mesh`] makes it of triangles or tetrahedra with their tags. OpenFOAM knows space alone:
+//! [`FoamMesh`] is the general form, points, faces as loops of them, and the cells that own the faces;
+//! [`FoamMesh::of_mesh`] makes it of triangles or tetrahedra with their tags. OpenFOAM knows space alone:
 //! flat cells become one layer of prisms, whose ends are the patch `frontAndBack` of type `empty`.
 
 mod read;
@@ -9,8 +9,9 @@ mod simplices;
 mod validate;
 mod write;
 
-pub use read::read_poly_mesh;
-pub use write::{check_poly_mesh_writable, write_poly_mesh};
+pub use super::error::FoamMeshError;
+pub use read::read_foam_mesh;
+pub use write::{check_foam_mesh_writable, write_foam_mesh};
 
 /// The names of the files in the folder, in the order in which they are written.
 const FILES: [&str; 7] =
@@ -18,56 +19,6 @@ const FILES: [&str; 7] =
 
 /// The patch of the ends of prisms that stand for flat cells.
 pub const FRONT_AND_BACK: &str = "frontAndBack";
-
-/// What is wrong with the parts of a [`PolyMesh`].
-#[derive(Clone, Debug, PartialEq, thiserror::Error)]
-#[non_exhaustive]
-pub enum PolyMeshError {
-    /// A face has fewer than three corners.
-    #[error("face {face} has {found} corners; expected 3 or more")]
-    FewCorners {
-        /// The face's index.
-        face: usize,
-        /// Its corners.
-        found: usize,
-    },
-    /// A number names nothing.
-    #[error("{of} names {what} {found}; there are {count}")]
-    Missing {
-        /// What has the number.
-        of: String,
-        /// What it should name.
-        what: &'static str,
-        /// The number.
-        found: u32,
-        /// How many there are to name.
-        count: usize,
-    },
-    /// A face has the same cell on both sides.
-    #[error("face {face} has cell {cell} on both sides")]
-    OneCell {
-        /// The face's index.
-        face: usize,
-        /// The cell.
-        cell: u32,
-    },
-    /// The faces around a cell leave a hole, or overlap.
-    #[error(
-        "cell {cell} is not closed at the edge of points {edge:?}; expected two faces there, turned against each other"
-    )]
-    Open {
-        /// The cell.
-        cell: u32,
-        /// The points at the ends of the edge.
-        edge: [u32; 2],
-    },
-    /// A cell has no faces.
-    #[error("cell {cell} has no faces")]
-    NoFaces {
-        /// The cell.
-        cell: u32,
-    },
-}
 
 /// What lies beyond a face, as its owner sees it.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -114,7 +65,7 @@ pub struct CellZone {
 
 /// Cells of any shape, given by their faces.
 #[derive(Clone, Debug, Default, PartialEq)]
-pub struct PolyMesh {
+pub struct FoamMesh {
     points: Vec<[f64; 3]>,
     cell_count: usize,
     patches: Vec<Patch>,
@@ -128,8 +79,8 @@ pub struct PolyMesh {
     note: String,
 }
 
-impl PolyMesh {
-    /// Points, and room for cells without faces yet.
+impl FoamMesh {
+    /// Points, and cells that have no faces yet.
     pub fn new(points: Vec<[f64; 3]>, cell_count: usize, patches: Vec<Patch>) -> Self {
         Self { points, cell_count, patches, ..Self::default() }
     }
@@ -139,14 +90,14 @@ impl PolyMesh {
     /// that the edge has. The patch [`FRONT_AND_BACK`] is put after `patches`.
     ///
     /// # Errors
-    /// [`PolyMeshError`] if an edge or a cell names what is not there.
+    /// [`FoamMeshError`] if an edge or a cell names what is not there.
     pub fn extruded<'a>(
         points: &[[f64; 2]],
         cells: impl ExactSizeIterator<Item = &'a [u32]>,
         edges: &[([u32; 2], u32, Beyond)],
         mut patches: Vec<Patch>,
         thickness: f64,
-    ) -> Result<Self, PolyMeshError> {
+    ) -> Result<Self, FoamMeshError> {
         let ends = Beyond::Patch(patches.len() as u32);
         patches.push(Patch { name: FRONT_AND_BACK.into(), is_empty: true });
         let up = points.len() as u32;
@@ -157,7 +108,7 @@ impl PolyMesh {
             if let Some(found) = [a, b].into_iter().find(|&corner| corner >= up) {
                 let of = format!("edge {}", mesh.face_count());
                 let count = points.len();
-                return Err(PolyMeshError::Missing { of, what: "point", found, count });
+                return Err(FoamMeshError::Missing { of, what: "point", found, count });
             }
             mesh.push_face(&[a, b, b + up, a + up], owner, beyond)?;
         }
@@ -178,16 +129,16 @@ impl PolyMesh {
     /// which they come.
     ///
     /// # Errors
-    /// [`PolyMeshError`] if a number names nothing.
+    /// [`FoamMeshError`] if a number names nothing.
     pub fn push_face(
         &mut self,
         corners: &[u32],
         owner: u32,
         beyond: Beyond,
-    ) -> Result<(), PolyMeshError> {
+    ) -> Result<(), FoamMeshError> {
         let face = self.owners.len();
         if corners.len() < 3 {
-            return Err(PolyMeshError::FewCorners { face, found: corners.len() });
+            return Err(FoamMeshError::FewCorners { face, found: corners.len() });
         }
         let of = || format!("face {face}");
         let point = corners.iter().copied().max().unwrap_or(0);
@@ -199,11 +150,11 @@ impl PolyMesh {
             [(point, self.points.len(), "point"), (owner, self.cell_count, "cell"), other]
         {
             if found as usize >= count {
-                return Err(PolyMeshError::Missing { of: of(), what, found, count });
+                return Err(FoamMeshError::Missing { of: of(), what, found, count });
             }
         }
         if beyond == Beyond::Cell(owner) {
-            return Err(PolyMeshError::OneCell { face, cell: owner });
+            return Err(FoamMeshError::OneCell { face, cell: owner });
         }
         self.corners.extend_from_slice(corners);
         self.ends.push(self.corners.len() as u32);
@@ -215,12 +166,12 @@ impl PolyMesh {
     /// Adds a named set of faces. OpenFOAM lets a face be in one zone at most.
     ///
     /// # Errors
-    /// [`PolyMeshError::Missing`] if a face is not there.
-    pub fn push_face_zone(&mut self, zone: FaceZone) -> Result<(), PolyMeshError> {
+    /// [`FoamMeshError::Missing`] if a face is not there.
+    pub fn push_face_zone(&mut self, zone: FaceZone) -> Result<(), FoamMeshError> {
         let count = self.owners.len();
         if let Some(&(found, _)) = zone.faces.iter().find(|(face, _)| *face as usize >= count) {
             let of = format!("zone {:?}", zone.name);
-            return Err(PolyMeshError::Missing { of, what: "face", found, count });
+            return Err(FoamMeshError::Missing { of, what: "face", found, count });
         }
         self.face_zones.push(zone);
         Ok(())
@@ -229,12 +180,12 @@ impl PolyMesh {
     /// Adds a named set of cells.
     ///
     /// # Errors
-    /// [`PolyMeshError::Missing`] if a cell is not there.
-    pub fn push_cell_zone(&mut self, zone: CellZone) -> Result<(), PolyMeshError> {
+    /// [`FoamMeshError::Missing`] if a cell is not there.
+    pub fn push_cell_zone(&mut self, zone: CellZone) -> Result<(), FoamMeshError> {
         let count = self.cell_count;
         if let Some(&found) = zone.cells.iter().find(|&&cell| cell as usize >= count) {
             let of = format!("zone {:?}", zone.name);
-            return Err(PolyMeshError::Missing { of, what: "cell", found, count });
+            return Err(FoamMeshError::Missing { of, what: "cell", found, count });
         }
         self.cell_zones.push(zone);
         Ok(())

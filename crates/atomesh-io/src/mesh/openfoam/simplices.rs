@@ -6,19 +6,19 @@ use atomesh::mesh::{Mesh, Tags};
 
 use super::super::data::MeshData;
 use super::super::metadata;
-use super::{Beyond, CellZone, FaceZone, Patch, PolyMesh, PolyMeshError};
+use super::{Beyond, CellZone, FaceZone, FoamMesh, FoamMeshError, Patch};
 
 /// The patch of the hull's facets that no group has.
 const OTHER: &str = "defaultFaces";
 
-impl PolyMesh {
+impl FoamMesh {
     /// The mesh with its tags: groups of facets become patches on the hull and face zones inside, regions
     /// become cell zones. A facet of several groups is given to the first. Fields are left out. Flat meshes
     /// become prisms as high as the square root of the mean area of cells.
     ///
     /// # Errors
-    /// [`PolyMeshError`] if a cell names a point twice or a facet has more than two cells.
-    pub fn of_mesh<const D: usize>(data: &MeshData<D>) -> Result<Self, PolyMeshError> {
+    /// [`FoamMeshError`] if a cell names a point twice or a facet has more than two cells.
+    pub fn of_mesh<const D: usize>(data: &MeshData<D>) -> Result<Self, FoamMeshError> {
         let (mesh, none) = (data.mesh(), Tags::default());
         let tags = data.tags().unwrap_or(&none);
         let groups = Groups::new(tags);
@@ -56,7 +56,7 @@ impl PolyMesh {
         for (name, cells) in regions(tags) {
             made.push_cell_zone(CellZone { name, cells })?;
         }
-        Ok(made.with_note(&format!("{} {}", metadata::NAME, metadata::encode(data))))
+        Ok(made.with_note(&format!("{} {}", metadata::NAME, data.metadata())))
     }
 
     /// The same without patches that have no face, whose order else stays.
@@ -86,24 +86,24 @@ impl PolyMesh {
     }
 }
 
-/// Faces between corners, as [`PolyMesh`] takes them.
+/// Faces between corners, as [`FoamMesh`] takes them.
 type Faces<const D: usize> = [([u32; D], u32, Beyond)];
 
 fn with_faces<const D: usize>(
     mesh: &Mesh<D>,
     faces: &Faces<D>,
     patches: Vec<Patch>,
-) -> Result<PolyMesh, PolyMeshError> {
+) -> Result<FoamMesh, FoamMeshError> {
     if D == 2 {
         let points: Vec<[f64; 2]> = mesh.points().iter().map(|p| [p[0], p[1]]).collect();
         let edges: Vec<_> =
             faces.iter().map(|&(f, owner, beyond)| ([f[0], f[1]], owner, beyond)).collect();
         let mean = mesh.measure().abs() / mesh.cell_count().max(1) as f64;
         let thickness = if mean > 0.0 { mean.sqrt() } else { 1.0 };
-        return PolyMesh::extruded(&points, mesh.cells(), &edges, patches, thickness);
+        return FoamMesh::extruded(&points, mesh.cells(), &edges, patches, thickness);
     }
     let points = mesh.points().iter().map(|p| std::array::from_fn(|k| p[k])).collect();
-    let mut made = PolyMesh::new(points, mesh.cell_count(), patches);
+    let mut made = FoamMesh::new(points, mesh.cell_count(), patches);
     for (corners, owner, beyond) in faces {
         made.push_face(corners, *owner, *beyond)?;
     }

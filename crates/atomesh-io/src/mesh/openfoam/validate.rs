@@ -1,14 +1,14 @@
 //! What a polyMesh promises.
 
-use super::{Beyond, PolyMesh, PolyMeshError};
+use super::{Beyond, FoamMesh, FoamMeshError};
 
-impl PolyMesh {
+impl FoamMesh {
     /// Checks that the faces around each cell close it: every edge of a face is one of exactly one other
     /// face of the cell, which runs along it the other way. Cost: O(n log n) in corners of faces.
     ///
     /// # Errors
-    /// [`PolyMeshError::Open`] names the first cell that is not closed.
-    pub fn validate(&self) -> Result<(), PolyMeshError> {
+    /// [`FoamMeshError::Open`] names the first cell that is not closed.
+    pub fn validate(&self) -> Result<(), FoamMeshError> {
         // each edge of each cell, with how often it runs up and down
         let mut edges: Vec<(u32, [u32; 2], bool)> = Vec::with_capacity(2 * self.corners.len());
         for face in 0..self.face_count() {
@@ -26,7 +26,7 @@ impl PolyMesh {
         for runs in edges.chunk_by(|a, b| (a.0, a.1) == (b.0, b.1)) {
             if !matches!(runs, [(_, _, false), (_, _, true)]) {
                 let (cell, edge, _) = runs[0];
-                return Err(PolyMeshError::Open { cell, edge });
+                return Err(FoamMeshError::Open { cell, edge });
             }
         }
         let closed = edges.chunk_by(|a, b| a.0 == b.0).count();
@@ -36,6 +36,6 @@ impl PolyMesh {
         let found =
             edges.chunk_by(|a, b| a.0 == b.0).zip(0..).find(|(runs, cell)| runs[0].0 != *cell);
         let cell = found.map_or(closed as u32, |(_, cell)| cell);
-        Err(PolyMeshError::NoFaces { cell })
+        Err(FoamMeshError::NoFaces { cell })
     }
 }

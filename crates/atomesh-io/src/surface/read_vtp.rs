@@ -1,13 +1,14 @@
 //! Reading VTP, VTK's XML format for poly data: lines of two points and triangles.
 
-use super::super::read::{MeshReadError, malformed};
-use super::array::Array;
-use super::read::Document;
-use crate::surface::LoadedSurface;
+use super::loaded::LoadedSurface;
+use crate::mesh::MeshReadError;
+use crate::mesh::read_error::malformed;
+use crate::mesh::vtu::array::Array;
+use crate::mesh::vtu::read::Document;
 
 /// Reads the lines and triangles of the first piece of a VTP file, with the names of their groups where
 /// atomesh wrote them. Other cells are an error.
-pub(crate) fn read_poly(bytes: &[u8]) -> Result<LoadedSurface, MeshReadError> {
+pub(super) fn read_vtp(bytes: &[u8]) -> Result<LoadedSurface, MeshReadError> {
     let document = Document::parse(bytes, "PolyData")?;
     let mut surface = LoadedSurface::default();
     let Some(piece) = document.pieces.first() else { return Ok(surface) };
