@@ -318,7 +318,7 @@ impl<const D: usize> Outcome<D> {
         let grid = self.potential.grid();
         let frame = Frame::new(grid.shape).and_then(|frame| frame.with_spacing(grid.step));
         let frame = frame.expect("a grid's shape and step were a frame's");
-        fidelity(&self.mesh, (&frame, samples), watch).map_err(RunError::Measure)
+        fidelity(&self.mesh, &frame, samples, watch).map_err(RunError::Measure)
     }
 }
 

@@ -6,7 +6,7 @@ use super::{Canvas, Sketch, grey};
 use crate::geometry::{Bounds, Point};
 use std::f64::consts::{PI, TAU};
 
-/// Beyond this many samples from its middle a line is no darker than its surroundings by 1e-6.
+/// The distance from its middle, in samples, beyond which a line is darker than its surroundings by less than 1e-6.
 const REACH: f64 = 7.0;
 /// Points of a trace that crosses the box; it is smooth at this resolution.
 const STEPS: usize = 128;
