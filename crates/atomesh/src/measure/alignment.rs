@@ -6,8 +6,7 @@ use super::nearest::{FacetTree, Near};
 use super::precision::PrecisionReport;
 use super::statistics::{percentile, sum};
 use crate::crests::FeaturePoint;
-use crate::mesh::Mesh;
-use crate::voronoi::PolyMesh;
+use crate::mesh::{Mesh, PolyMesh};
 use crate::watch::{Phase, Watch, check};
 use rand::{Rng, SeedableRng};
 use rayon::prelude::*;
@@ -95,7 +94,7 @@ pub fn alignment_of_faces<const D: usize>(
 ) -> Result<AlignmentReport, MeasureError> {
     check_size(options.size)?;
     check(watch, Phase::Measure, 0.0, None)?;
-    let facets = (0..mesh.face_count()).flat_map(|face| mesh.parts(face)).collect();
+    let facets = (0..mesh.face_count()).flat_map(|face| mesh.face_parts(face)).collect();
     alignment_by(&FacetTree::of(mesh.points(), facets), features, options, watch)
 }
 

@@ -23,7 +23,7 @@ mod truth;
 mod tests;
 
 pub use layers::{Fold, Layers};
-pub use truth::{Feature, Geometry, Role, Truth};
+pub use truth::{Geometry, Role, TrueFeature, Truth};
 
 use crate::geometry::{Bounds, Point};
 use crate::image::{Frame, FrameError, Grid, Image, Units};
@@ -297,7 +297,7 @@ type Shade<const D: usize> = Box<dyn Fn(&Point<D>) -> f64 + Sync>;
 
 /// A scene before it is sampled.
 struct Sketch<const D: usize> {
-    features: Vec<Feature<D>>,
+    features: Vec<TrueFeature<D>>,
     layers: Option<Layers<D>>,
     shade: Shade<D>,
 }

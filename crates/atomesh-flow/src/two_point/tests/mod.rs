@@ -5,8 +5,8 @@ mod exact;
 mod wells;
 
 use atomesh::geometry::{Bounds, Point, lexicographic};
-use atomesh::mesh::Delaunay;
-use atomesh::voronoi::{PolyMesh, voronoi};
+use atomesh::mesh::{Delaunay, PolyMesh};
+use atomesh::voronoi::voronoi;
 use atomesh::watch::Silent;
 use rand::{RngExt, SeedableRng};
 use rand_pcg::Pcg64;
@@ -81,7 +81,7 @@ fn all_sides<'a, const D: usize>(
     pressure: &'a (dyn Fn(&Point<D>) -> f64 + Sync),
 ) -> Vec<Boundary<'a, D>> {
     let condition = Condition::Pressure(Value::Field(pressure));
-    let side = |n| Boundary { group: atomesh::voronoi::side_name(n).to_string(), condition };
+    let side = |n| Boundary { group: atomesh::mesh::side_name(n).to_string(), condition };
     (0..2 * D).map(side).collect()
 }
 
@@ -96,7 +96,7 @@ fn well<const D: usize>(place: Point<D>, control: Control, radius: Option<f64>) 
 
 /// Names the faces inside the box whose centroids the test chooses.
 fn name_faces<const D: usize>(
-    grid: &mut Grid<D>,
+    grid: &mut FlowGrid<D>,
     name: &str,
     chosen: impl Fn(&crate::grid::FlowFacet<D>) -> bool,
 ) -> usize {
@@ -110,7 +110,7 @@ fn name_faces<const D: usize>(
 /// Solves, and checks what holds of every answer: mass balances, and barriers leak nothing.
 fn answer<const D: usize>(
     cells: &PolyMesh<D>,
-    grid: &Grid<D>,
+    grid: &FlowGrid<D>,
     problem: &Problem<'_, D>,
 ) -> Solution<D> {
     let setting = Setting::new(problem, grid).unwrap();
