@@ -3,8 +3,7 @@
 use std::path::{Path, PathBuf};
 
 use atomesh::enhance::{
-    EdgeCrestOptions, EdgeOperator, FaultOptions, FeatureOptions, HorizonOptions, Mixture,
-    Polarity, RidgeOptions,
+    CrestOptions, EdgeOperator, FaultOptions, FeatureOptions, HorizonOptions, Mixture, Polarity,
 };
 use atomesh::fields::GradeBy;
 use atomesh::fields::Interpolation;
@@ -136,6 +135,14 @@ impl PotentialOptions {
     /// What the core takes of them: what is not given, from `basis`.
     pub fn feature_options(&self, basis: FeatureOptions) -> FeatureOptions {
         let single = self.features.as_ref().and_then(|mixture| mixture.0.single());
+        let crests = CrestOptions {
+            polarity: self.polarity,
+            scale: self.scale,
+            normal_scale: self.normal_scale,
+            low: self.low,
+            high: self.high,
+            least_length: self.least_length,
+        };
         FeatureOptions {
             features: single.unwrap_or(basis.features),
             edge_operator: self.edge_operator.unwrap_or(basis.edge_operator),
@@ -143,38 +150,16 @@ impl PotentialOptions {
             smooth: self.smooth.or(basis.smooth),
             denoise: self.denoise.or(basis.denoise),
             repel: self.repel.unwrap_or(basis.repel),
-            ridges: RidgeOptions {
-                polarity: self.polarity.unwrap_or(basis.ridges.polarity),
-                scale: self.scale.unwrap_or(basis.ridges.scale),
-                normal_scale: self.normal_scale.unwrap_or(basis.ridges.normal_scale),
-                low: self.low.map_or(basis.ridges.low, |low| low as f32),
-                high: self.high.map_or(basis.ridges.high, |high| high as f32),
-                least_length: self.least_length.unwrap_or(basis.ridges.least_length),
-            },
-            horizons: HorizonOptions {
-                polarity: self.polarity.unwrap_or(basis.horizons.polarity),
-                scale: self.scale.unwrap_or(basis.horizons.scale),
-                normal_scale: self.normal_scale.unwrap_or(basis.horizons.normal_scale),
-                low: self.low.map_or(basis.horizons.low, |low| low as f32),
-                high: self.high.map_or(basis.horizons.high, |high| high as f32),
-                least_length: self.least_length.unwrap_or(basis.horizons.least_length),
-                ..basis.horizons
-            },
+            ridges: crests.or(basis.ridges),
+            horizons: HorizonOptions { crests: crests.or(basis.horizons.crests), ..basis.horizons },
             faults: FaultOptions {
                 layer_reach: self.layer_reach.unwrap_or(basis.faults.layer_reach),
                 dip_reach: self.dip_reach.unwrap_or(basis.faults.dip_reach),
                 least_dip: self.least_dip.unwrap_or(basis.faults.least_dip),
-                low: self.low.unwrap_or(basis.faults.low),
-                high: self.high.unwrap_or(basis.faults.high),
-                least_length: self.least_length.unwrap_or(basis.faults.least_length),
+                crests: crests.or(basis.faults.crests),
                 ..basis.faults
             },
-            crests: EdgeCrestOptions {
-                scale: self.edge_scale.or(basis.crests.scale),
-                low: self.low.map_or(basis.crests.low, |low| low as f32),
-                high: self.high.map_or(basis.crests.high, |high| high as f32),
-                least_length: self.least_length.unwrap_or(basis.crests.least_length),
-            },
+            edges: CrestOptions { scale: self.edge_scale, ..crests }.or(basis.edges),
             ..basis
         }
     }

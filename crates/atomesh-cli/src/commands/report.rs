@@ -151,7 +151,7 @@ fn measure<const D: usize>(
     let report = MeshReport::new(&mesh, &frame.grid(units), &samples, size, watch);
     let mut report = report.map_err(super::measure_failure).map_err(about(&args.mesh))?;
     if let (Some(image), Some(path)) = (&image, &args.image) {
-        let found = fidelity(&loaded.mesh, (image.frame(), image.samples()), watch);
+        let found = fidelity(&loaded.mesh, image.frame(), image.samples(), watch);
         report.fidelity = Some(found.map_err(super::measure_failure).map_err(about(path))?);
     }
     if let (Some(labels), Some(path)) = (&labels, &args.labels) {

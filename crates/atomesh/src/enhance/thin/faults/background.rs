@@ -1,8 +1,9 @@
-//! What noise, and layers that are not quite followed, make of the semblance in a part of the image.
+//! The missing semblance of samples without a fault, in each part of the image: from noise, and from layers that are not
+//! quite followed.
 //!
-//! Faults are in a small part of all samples, so that the median of the missing semblance is what samples
-//! without fault have. It is taken in windows about the nodes of a coarse grid, and is linear between them, since
-//! noise is stronger beside the signal where layers are faint.
+//! Few samples are on faults, so that the median of the missing semblance is that of samples without. It is taken in
+//! windows about the nodes of a coarse grid, since where layers are faint noise is stronger beside the signal, and is
+//! linear between nodes.
 
 use super::facing::volume;
 use rayon::prelude::*;
@@ -10,7 +11,7 @@ use rayon::prelude::*;
 /// Samples between nodes; windows reach to the next nodes.
 const STEP: usize = 32;
 
-/// Of a volume's samples one of so many along each axis is looked at.
+/// Medians of volumes use every third sample along each axis.
 const EVERY: usize = 3;
 
 /// Medians at nodes.

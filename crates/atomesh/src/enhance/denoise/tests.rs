@@ -1,3 +1,4 @@
+use super::block::{LEAST_WEIGHT, mirrored, moving_sum};
 use super::*;
 use crate::watch::Silent;
 use std::ops::ControlFlow;

@@ -1,6 +1,5 @@
-//! From the best plane of every sample to crests.
+//! From the best plane of every sample to crests: non-maximum suppression across the planes.
 
-use super::FaultOptions;
 use super::background::Background;
 use super::facing::volume;
 use super::scan::{Found, Orientation};
@@ -8,38 +7,31 @@ use crate::crests::FeaturePoint;
 use crate::image::Grid;
 use rayon::prelude::*;
 
-/// The power of semblance that is compared with 1, as Hale's.
+/// The power of semblance in the likelihood, Hale's.
 const POWER: i32 = 8;
 
-/// The samples whose likelihood is a maximum across the plane, along the axis that it faces, as crests.
+/// The samples whose likelihood is a maximum across their plane, along the axis that it faces, and not below `low`.
 ///
-/// The likelihood is 1 − s⁸, s being the semblance without what the background lacks. A crest is at the vertex of
-/// the parabola through three samples; its normal is the plane's, in lattice units.
-pub(super) fn thin<const D: usize>(
+/// The likelihood is 1 − s⁸, s being 1 less the missing semblance beyond `background` times that of the surroundings. A
+/// crest is at the vertex of the parabola through three samples; its normal is the plane's, in lattice units.
+pub(super) fn maxima<const D: usize>(
     mut found: Found,
     grid: &Grid<D>,
-    options: &FaultOptions,
+    background: f32,
+    low: f32,
 ) -> Vec<FeaturePoint<D>> {
     let [nx, ny, _] = volume(grid.shape);
-    let background = Background::new(&found.missing, grid.shape);
-    let share = options.background as f32;
-    found.missing.par_chunks_mut(nx).enumerate().for_each(|(row, missing)| {
-        for (x, missing) in missing.iter_mut().enumerate() {
-            let usual = share * background.at([x, row % ny, row / ny]);
-            let semblance = 1.0 - (*missing - usual).clamp(0.0, 1.0);
-            *missing = 1.0 - semblance.powi(POWER);
-        }
-    });
+    to_likelihood(&mut found.missing, grid.shape, background);
     let likelihood = found.missing;
     let crests = likelihood.par_chunks(nx).enumerate().flat_map_iter(|(row, chunk)| {
-        let (likelihood, found) = (&likelihood, (&found.best, &found.orientations));
+        let (likelihood, best, orientations) = (&likelihood, &found.best, &found.orientations);
         chunk.iter().enumerate().filter_map(move |(x, &here)| {
             let index = row * nx + x;
-            let orientation = &found.1[found.0[index] as usize];
+            let orientation = &orientations[best[index] as usize];
             let sample = [x, row % ny, row / ny];
             let axis = orientation.facing.axis;
             let inside = sample[axis] > 0 && sample[axis] + 1 < orientation.facing.across;
-            if here < options.low as f32 || here == 0.0 || !inside {
+            if here < low || here == 0.0 || !inside {
                 return None;
             }
             let stride = orientation.facing.stride();
@@ -61,6 +53,19 @@ pub(super) fn thin<const D: usize>(
         })
     });
     crests.collect()
+}
+
+/// Turns missing semblances into likelihoods.
+fn to_likelihood<const D: usize>(missing: &mut [f32], shape: [usize; D], background: f32) {
+    let [nx, ny, _] = volume(shape);
+    let medians = Background::new(missing, shape);
+    missing.par_chunks_mut(nx).enumerate().for_each(|(row, missing)| {
+        for (x, missing) in missing.iter_mut().enumerate() {
+            let usual = background * medians.at([x, row % ny, row / ny]);
+            let semblance = 1.0 - (*missing - usual).clamp(0.0, 1.0);
+            *missing = 1.0 - semblance.powi(POWER);
+        }
+    });
 }
 
 /// Where the parabola through three samples, the middle one the greatest, has its vertex, from the middle one.

@@ -1,4 +1,4 @@
-//! How layers slope: by how many samples they go down for one along x, and along y.
+//! The slopes of layers: by how many samples they go down for one sample along x, and along y.
 
 use crate::image::{Grid, StructureTensor};
 use crate::watch::{Cancelled, Watch};
@@ -14,7 +14,7 @@ const ACROSS: f64 = 3.0;
 /// Standard deviation, in samples, of the window down: some layers, which slope alike.
 const DOWN: f64 = 8.0;
 
-/// Layers steeper than this are followed as if they were as steep.
+/// The greatest slope along which layers are followed.
 const STEEPEST: f32 = 2.0;
 
 /// Samples of one task.

@@ -4,7 +4,7 @@
 //! angle from v, within ±1, and `dip` the cotangent of the dip in an upright plane of constant v. The mean along
 //! it is taken along the strike first, by a Gaussian across some upright planes, and then along the
 //! dip, by a two-sided exponential: rows are shifted until the dip is upright, so that each is
-//! interpolated twice, whatever the mean's reach is. Where the image ends, what is there makes the mean.
+//! interpolated twice, whatever the mean's reach is. At the image's ends the mean is over the samples that are there.
 
 use super::FaultOptions;
 use super::facing::{Facing, in_order};
@@ -27,7 +27,7 @@ const TAIL: f64 = 7.0;
 /// Where Gaussians end, in standard deviations.
 const TRUNCATE: f64 = 2.5;
 
-/// The share of the mean energy below which a sample's is raised: what is next to silent has no faults.
+/// Added to the energy of every sample, over the mean energy: what is next to silent has no faults.
 const SILENT: f64 = 1e-3;
 
 /// A plane that a fault may lie on.
@@ -58,8 +58,14 @@ impl Found {
     }
 }
 
+/// A strike, as ∂u/∂v, and the dips scanned with it, as ∂u/∂z.
+struct Strike {
+    slope: f32,
+    dips: Vec<f32>,
+}
+
 /// The strikes, each with its dips.
-fn orientations(facing: &Facing, options: &FaultOptions) -> Vec<(f32, Vec<f32>)> {
+fn strikes(facing: &Facing, options: &FaultOptions) -> Vec<Strike> {
     let strikes = if facing.along > 1 { STRIKES } else { 0 };
     let most = 1.0 / options.least_dip.to_radians().tan();
     let dips = (most / DIP_STEP).ceil().max(1.0) as i32;
@@ -67,7 +73,8 @@ fn orientations(facing: &Facing, options: &FaultOptions) -> Vec<(f32, Vec<f32>)>
         let strike = f64::from(k) / f64::from(STRIKES);
         // along u, planes of one dip are farther from upright the more they are turned
         let step = most / f64::from(dips) * (1.0 + strike * strike).sqrt();
-        (strike as f32, (-dips..=dips).map(|j| (f64::from(j) * step) as f32).collect())
+        let dips = (-dips..=dips).map(|j| (f64::from(j) * step) as f32).collect();
+        Strike { slope: strike as f32, dips }
     };
     (-strikes..=strikes).map(strike).collect()
 }
@@ -83,10 +90,11 @@ pub(super) fn scan(
     found: &mut Found,
     watch: &mut dyn Watch,
 ) -> Result<(), Cancelled> {
-    let orientations = orientations(facing, options);
+    let strikes = strikes(facing, options);
     let first = found.orientations.len() as u16;
-    for &(strike, ref dips) in &orientations {
-        let planes = dips.iter().map(|&dip| Orientation { facing: *facing, strike, dip });
+    for Strike { slope, dips } in &strikes {
+        let plane = |&dip: &f32| Orientation { facing: *facing, strike: *slope, dip };
+        let planes = dips.iter().map(plane);
         found.orientations.extend(planes);
     }
     let mean = sides.energy.iter().map(|&e| f64::from(e)).sum::<f64>() / sides.energy.len() as f64;
@@ -96,7 +104,7 @@ pub(super) fn scan(
     let scan = Scan {
         sides,
         facing,
-        orientations,
+        strikes,
         floor: (SILENT * mean) as f32,
         strike_reach: options.strike_reach,
         keep: keep as f32,
@@ -128,8 +136,7 @@ struct Best {
 struct Scan<'a> {
     sides: &'a Sides,
     facing: &'a Facing,
-    /// The strikes, each with its dips.
-    orientations: Vec<(f32, Vec<f32>)>,
+    strikes: Vec<Strike>,
     /// Added to the energy.
     floor: f32,
     strike_reach: f64,
@@ -153,8 +160,8 @@ impl Scan<'_> {
         let mut mean = vec![0.0; rows.len() * width];
         let mut upright = Upright::default();
         let mut number = 0;
-        for (strike, dips) in &self.orientations {
-            self.along_strike(v, &rows, *strike, &mut mean);
+        for Strike { slope, dips } in &self.strikes {
+            self.along_strike(v, &rows, *slope, &mut mean);
             for &dip in dips {
                 upright.turn(&mean, width, dip, self.keep);
                 upright.each_row_back(self.keep, &within, |row, place, weight| {
@@ -212,8 +219,8 @@ impl Shift {
         Self { whole: whole as isize, fraction: by - whole }
     }
 
-    /// Gives `take` the places of `out` and what is `self` behind each in `row`, linear between samples; a row's
-    /// ends go on level.
+    /// Gives `take` each place of `out` and the value of `row` by the shift behind it, linear between samples; beyond
+    /// its ends a row is constant.
     #[inline(always)]
     fn each(&self, row: &[f32], out: &mut [f32], take: impl Fn(&mut f32, f32)) {
         let (n, count) = (row.len() as isize, out.len() as isize);
@@ -295,8 +302,8 @@ impl Upright {
         }
     }
 
-    /// Gives `take` each of the rows wanted, from the last to the first, with its means and what they are to be
-    /// multiplied by.
+    /// Gives `take` the number of each row wanted, from the last to the first, its sums, and the factor that makes means
+    /// of them.
     fn each_row_back(
         &mut self,
         keep: f32,
@@ -333,8 +340,16 @@ impl Upright {
 mod tests {
     use super::*;
 
+    /// A dip, and the factor by which weights along it fall.
+    #[derive(Clone, Copy)]
+    struct Slant {
+        dip: f64,
+        keep: f64,
+    }
+
     /// The mean along a dip at a sample, by its definition.
-    fn direct(values: &[f32], width: usize, (dip, keep): (f64, f64), row: usize, u: usize) -> f64 {
+    fn direct(values: &[f32], width: usize, slant: Slant, row: usize, u: usize) -> f64 {
+        let Slant { dip, keep } = slant;
         let (mut sum, mut total) = (0.0, 0.0);
         for (other, values) in values.chunks(width).enumerate() {
             let away = other as f64 - row as f64;
@@ -349,13 +364,14 @@ mod tests {
     }
 
     /// The means along a dip are those of the definition, to roundings, at the samples of a range of each row.
-    fn equals_direct(values: &[f32], width: usize, (dip, keep): (f64, f64), within: Range<usize>) {
+    fn equals_direct(values: &[f32], width: usize, slant: Slant, within: Range<usize>) {
+        let Slant { dip, keep } = slant;
         let rows = values.len() / width;
         let mut upright = Upright::default();
         upright.turn(values, width, dip as f32, keep as f32);
         upright.each_row_back(keep as f32, &(0..rows), |row, place, weight| {
             place.read(|u, sum| {
-                let slow = direct(values, width, (dip, keep), row, u);
+                let slow = direct(values, width, slant, row, u);
                 let fast = f64::from(sum * weight);
                 let near = (fast - slow).abs() < 1e-4; // of values below 10, some dozens are added
                 assert!(near || !within.contains(&u), "{fast} {slow} at {u}, {row}: dip {dip}");
@@ -369,13 +385,13 @@ mod tests {
         let any: Vec<f32> = (0..width * 9).map(|i| (i * i * 31 % 97) as f32 / 10.0).collect();
         for dip in [0.0, 1.0, -1.0, 2.0] {
             // from sample to sample: nothing is interpolated, and rows' ends go on level
-            equals_direct(&any, width, (dip, 0.8), 0..width);
+            equals_direct(&any, width, Slant { dip, keep: 0.8 }, 0..width);
         }
         let sloping = |i: usize| 0.1 * (i % width) as f32 + (i / width * 7 % 5) as f32;
         let sloping: Vec<f32> = (0..width * 9).map(sloping).collect();
         for dip in [0.3, -0.85, 1.21] {
             // a slope is exact between samples, where no plane leaves the rows
-            equals_direct(&sloping, width, (dip, 0.9), 11..width - 11);
+            equals_direct(&sloping, width, Slant { dip, keep: 0.9 }, 11..width - 11);
         }
     }
 }

@@ -1,123 +1,80 @@
 //! Crests of edges: the lines (2-D) and surfaces (3-D) along which an image changes most.
 //!
-//! In this order, after Canny (1986):
-//!
-//! 1. the gradient of the image smoothed by a Gaussian, as narrow as the noise allows;
-//! 2. where the gradient is greatest along its own direction, between samples: the zero crossings of
-//!    the second derivative at which the third is negative;
-//! 3. groups of crests that are strong somewhere, nowhere faint or as weak as noise, and large enough.
+//! After Canny (1986). The field is the gradient of the image, smoothed by a Gaussian as narrow as the noise allows, and
+//! the direction its own. Crests are where it is greatest along this direction: the zero crossings of the second
+//! derivative at which the third is negative. Gradients as weak as those of noise do not count.
 
-use super::crossings::{Row, Unit, crossings, scale_strengths};
-use super::quantile::{Order, Ranks};
-use super::ridges::least_count;
-use super::{EnhanceError, LEAST_EDGE_SCALE, LONGEST, MOST_EXTENT, within};
-use crate::crests::{FeaturePoint, Hysteresis, linked};
+use super::crossings::{Row, crossings, scale_strengths};
+use super::unit::UnitValues;
+use super::{CrestOptions, Finder, Thresholds};
+use crate::crests::FeaturePoint;
+use crate::enhance::EnhanceError;
+use crate::enhance::quantile::{Order, Ranks};
 use crate::image::{Grid, coordinates};
-use crate::watch::{Phase, Watch, check};
-use serde::{Deserialize, Serialize};
+use crate::watch::Watch;
 
-/// The scales that are chosen among, in least steps: from the one that fills the gaps between samples of slanted edges.
+/// The scales to choose from, in least steps; the least fills the gaps between samples of slanted edges.
 const SCALES: std::ops::RangeInclusive<f64> = 1.5..=4.0;
 
-/// How many times as steep as noise the gradient of a clear edge must be.
+/// The gradient of a clear edge, over that of noise.
 const CLEAR: f64 = 10.0;
 
-/// How many times as steep as noise any edge must be.
+/// The least gradient of an edge, over that of noise.
 const LEAST_ABOVE_NOISE: f64 = 4.0;
 
-/// The share of samples at each end of the range that are no measure of the contrast.
+/// The share of samples, at each end of the range, that are left out of the contrast.
 const ODD: f64 = 0.005;
 
 /// The median of the magnitudes of Gaussian noise over its standard deviation.
 const MEDIAN_MAGNITUDE: f64 = 0.6745;
 
-/// How crests of edges are found.
-#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
-#[serde(default, deny_unknown_fields, rename_all = "kebab-case")]
-pub struct EdgeCrestOptions {
-    /// Standard deviation of the Gaussian whose derivatives are taken, in least steps. Default: the least of
-    /// 1.5…4 at which half the image's contrast stands out of its noise.
-    pub scale: Option<f64>,
-    /// How strong crests must be, 0…1, where 1 is the 98th percentile of their gradients. Default 0.2:
-    /// with 0.1 atoms of a brain's mesh also followed what nobody would call an edge, at the cost of those that count.
-    pub low: f32,
-    /// How strong a group of crests must be somewhere, 0…1. Default 0.5.
-    pub high: f32,
-    /// The least length of a line, in samples; the least area of a surface is its square. Default 10.
-    pub least_length: f64,
-}
+/// Finds the crests of edges.
+pub(super) struct Edges(pub CrestOptions);
 
-impl Default for EdgeCrestOptions {
-    fn default() -> Self {
-        Self { scale: None, low: 0.2, high: 0.5, least_length: 10.0 }
+impl<const D: usize> Finder<D> for Edges {
+    const KIND: &'static str = "edges";
+    const THRESHOLDS: Thresholds = Thresholds { low: 0.2, high: 0.5, least_length: 10.0 };
+
+    fn options(&self) -> &CrestOptions {
+        &self.0
     }
-}
 
-impl EdgeCrestOptions {
-    /// Refuses what is out of range.
-    fn check(&self) -> Result<(), EnhanceError> {
-        within(
-            "edges",
-            &[
-                ("scale", self.scale.unwrap_or(1.0), LEAST_EDGE_SCALE, LONGEST),
-                ("low", self.low.into(), 0.0, 1.0),
-                ("high", self.high.into(), 0.0, 1.0),
-                ("least-length", self.least_length, 0.0, MOST_EXTENT),
-            ],
-        )
+    fn points(
+        &self,
+        values: &[f32],
+        grid: &Grid<D>,
+        watch: &mut dyn Watch,
+    ) -> Result<Vec<FeaturePoint<D>>, EnhanceError> {
+        let Some(unit) = UnitValues::new(values) else { return Ok(Vec::new()) };
+        let grid = grid.in_least_steps();
+        let noise = noise(&unit, grid.shape);
+        let contrast = 0.5 * f64::from(unit.quantile(1.0 - ODD) - unit.quantile(ODD));
+        let sigma = self.0.scale.unwrap_or_else(|| clear_scale::<D>(noise, contrast));
+        let faint = (LEAST_ABOVE_NOISE * noise * noise_slope::<D>(sigma)) as f32;
+        let visit = |row: &Row<D>, crests: &mut Vec<FeaturePoint<D>>| {
+            for x in 0..row.average.len() {
+                let gradient = row.gradient(x);
+                let steepness = gradient.iter().map(|g| g * g).sum::<f32>().sqrt();
+                if steepness <= faint {
+                    continue;
+                }
+                let normal = gradient.map(|g| g / steepness);
+                if let Some(steepest) = row.steepest(&normal, x) {
+                    crests.extend(row.crest(x, normal, steepest.offset, steepest.slope));
+                }
+            }
+        };
+        let fill = |start: usize, out: &mut [f32]| unit.fill(start, out);
+        let mut crests = crossings(fill, &grid, sigma, visit, watch)?;
+        scale_strengths(&mut crests);
+        Ok(crests)
     }
-}
-
-/// The crests of an image's edges; none if it is constant.
-///
-/// # Errors
-/// [`EnhanceError::Option`] for an option out of its range, [`EnhanceError::Cancelled`] if the watch ends the
-/// work.
-///
-/// # Panics
-/// If there are not as many values as the grid's shape says.
-pub(crate) fn edge_crests<const D: usize>(
-    values: &[f32],
-    grid: &Grid<D>,
-    options: &EdgeCrestOptions,
-    watch: &mut dyn Watch,
-) -> Result<Vec<FeaturePoint<D>>, EnhanceError> {
-    options.check()?;
-    let Some(unit) = Unit::new(values) else { return Ok(Vec::new()) };
-    check(watch, Phase::Potential, 0.0, None)?;
-    let grid = grid.in_least_steps();
-    let noise = noise(&unit, grid.shape);
-    let contrast = 0.5 * f64::from(unit.quantile(1.0 - ODD) - unit.quantile(ODD));
-    let sigma = options.scale.unwrap_or_else(|| clear_scale::<D>(noise, contrast));
-    let faint = (LEAST_ABOVE_NOISE * noise * noise_slope::<D>(sigma)) as f32;
-    let visit = |row: &Row<D>, crests: &mut Vec<FeaturePoint<D>>| {
-        for x in 0..row.average.len() {
-            let gradient = row.gradient(x);
-            let steepness = gradient.iter().map(|g| g * g).sum::<f32>().sqrt();
-            if steepness <= faint {
-                continue;
-            }
-            let normal = gradient.map(|g| g / steepness);
-            if let Some((offset, greatest)) = row.steepest(&normal, x) {
-                crests.extend(row.crest(x, normal, offset, greatest));
-            }
-        }
-    };
-    let fill = |start: usize, out: &mut [f32]| unit.fill(start, out);
-    let mut crests = crossings(fill, &grid, sigma, visit, watch)?;
-    scale_strengths(&mut crests);
-    let least = least_count::<D>(options.least_length);
-    Ok(linked(
-        crests,
-        grid.shape,
-        Hysteresis { low: options.low.into(), high: options.high.into(), least_count: least },
-    ))
 }
 
 /// The standard deviation of the image's noise, by the median magnitude of differences between neighbours along
 /// all axes at once, of those that are not 0 (Donoho & Johnstone 1994): edges are few, and most of
 /// them change along one axis more than along all.
-fn noise<const D: usize>(unit: &Unit, shape: [usize; D]) -> f64 {
+fn noise<const D: usize>(unit: &UnitValues, shape: [usize; D]) -> f64 {
     let count = shape.iter().product();
     let order = Order::new(count, |start, out: &mut [f32]| detail(unit, shape, start, out));
     let none = order.ranked(0);
@@ -128,7 +85,7 @@ fn noise<const D: usize>(unit: &Unit, shape: [usize; D]) -> f64 {
 
 /// Writes, for samples from index `start` on, the magnitude of the difference of sums over the corners of a cell
 /// of neighbours, those reached by an even and by an odd number of steps; as large as the noise of one sample.
-fn detail<const D: usize>(unit: &Unit, shape: [usize; D], start: usize, out: &mut [f32]) {
+fn detail<const D: usize>(unit: &UnitValues, shape: [usize; D], start: usize, out: &mut [f32]) {
     let mut neighbours = vec![0.0; out.len()];
     out.fill(0.0);
     // an axis of one sample has no neighbours
@@ -187,9 +144,9 @@ mod tests {
     fn found<const D: usize>(
         values: &[f32],
         grid: &Grid<D>,
-        options: &EdgeCrestOptions,
+        options: CrestOptions,
     ) -> Vec<FeaturePoint<D>> {
-        edge_crests(values, grid, options, &mut Silent).unwrap()
+        super::super::crests(&Edges(options), values, grid, &mut Silent).unwrap()
     }
 
     /// Noise of deviation 1, by the sum of twelve uniform numbers.
@@ -210,8 +167,8 @@ mod tests {
         let values: Vec<f32> = (0..grid.sample_count())
             .map(|i| step(along(coordinates(i, grid.shape).map(|c| c as f64))))
             .collect();
-        let options = EdgeCrestOptions { scale: Some(1.5), ..Default::default() };
-        let crests = found(&values, &grid, &options);
+        let options = CrestOptions { scale: Some(1.5), ..Default::default() };
+        let crests = found(&values, &grid, options);
         let mut count = 0;
         for crest in &crests {
             let sample = coordinates(crest.index, grid.shape);
@@ -241,8 +198,7 @@ mod tests {
         let values: Vec<f32> = (0..grid.sample_count())
             .map(|i| step(radius(coordinates(i, grid.shape).map(|c| c as f64)) - 13.0))
             .collect();
-        let crests =
-            found(&values, &grid, &EdgeCrestOptions { scale: Some(1.0), ..Default::default() });
+        let crests = found(&values, &grid, CrestOptions { scale: Some(1.0), ..Default::default() });
         // smoothing by σ = 1 moves a curved edge inwards by σ²/R = 0.08 (Verbeek & van Vliet 1994); its
         // slope is a bell a little askew
         let radii: Vec<f64> = crests.iter().map(|c| radius(c.position)).collect();
@@ -261,7 +217,7 @@ mod tests {
             values.iter_mut().enumerate().for_each(|(i, v)| {
                 *v = *v * deviation + if i % 80 > 30 { 1.0 } else { 0.0 };
             });
-            let unit = Unit::new(&values).unwrap();
+            let unit = UnitValues::new(&values).unwrap();
             let range = values.iter().fold((f32::MAX, f32::MIN), |(a, b), &v| (a.min(v), b.max(v)));
             let found = noise(&unit, shape) * f64::from(range.1 - range.0);
             // 5000 samples, of which one column in 80 holds the edge
@@ -269,7 +225,7 @@ mod tests {
         }
         let constant_but_one: Vec<f32> =
             (0..count).map(|i| if i == 900 { 1.0 } else { 0.0 }).collect();
-        let unit = Unit::new(&constant_but_one).unwrap();
+        let unit = UnitValues::new(&constant_but_one).unwrap();
         assert!(noise(&unit, shape).is_finite());
     }
 
@@ -277,7 +233,7 @@ mod tests {
     fn details_are_the_differences_of_neighbours() {
         let shape = [3, 2, 2];
         let values: Vec<f32> = (0..12).map(|i| ((i * i * 5) % 13) as f32).collect();
-        let unit = Unit::new(&values).unwrap();
+        let unit = UnitValues::new(&values).unwrap();
         let mut out = vec![0.0; 12];
         detail(&unit, shape, 0, &mut out);
         let range = values.iter().fold((f32::MAX, f32::MIN), |(a, b), &v| (a.min(v), b.max(v)));
@@ -332,7 +288,7 @@ mod tests {
             *v = *v * 0.1 + if i % 100 >= 50 { 1.0 } else { 0.0 };
         });
         let grid = Grid { shape, step: [1.0; 2] };
-        let crests = found(&values, &grid, &EdgeCrestOptions::default());
+        let crests = found(&values, &grid, CrestOptions::default());
         let far = crests.iter().filter(|c| (c.position[0] - 49.5).abs() > 2.0).count();
         assert!(crests.len() >= 90 && far * 20 < crests.len(), "{far} of {}", crests.len());
     }
@@ -342,10 +298,10 @@ mod tests {
         for shape in [[7, 5, 1], [1, 1, 1], [1, 9, 4], [2, 2, 2]] {
             let grid = Grid { shape, step: [1.0; 3] };
             let count = grid.sample_count();
-            assert!(found(&vec![3.0; count], &grid, &EdgeCrestOptions::default()).is_empty());
+            assert!(found(&vec![3.0; count], &grid, CrestOptions::default()).is_empty());
             let values: Vec<f32> = (0..count).map(|i| (i * 7 % 5) as f32).collect();
-            let options = EdgeCrestOptions { least_length: 0.0, ..Default::default() };
-            for crest in found(&values, &grid, &options) {
+            let options = CrestOptions { least_length: Some(0.0), ..Default::default() };
+            for crest in found(&values, &grid, options) {
                 assert!((0.0..=1.0).contains(&crest.strength));
             }
         }

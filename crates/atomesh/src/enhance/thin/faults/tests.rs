@@ -1,6 +1,6 @@
 //! Faults are found where they were drawn, and only there.
 
-use super::judge::{Score, deviation, score};
+use super::score::{Score, deviation, noisy, score};
 use super::*;
 use crate::image::coordinates;
 use crate::synth::Scene;
@@ -41,7 +41,16 @@ fn unit<const D: usize>(shape: [usize; D]) -> Grid<D> {
 }
 
 fn found<const D: usize>(values: &[f32], shape: [usize; D]) -> Vec<FeaturePoint<D>> {
-    faults(values, &unit(shape), &FaultOptions::default(), &mut Silent).unwrap()
+    faults(values, &unit(shape), FaultOptions::default(), &mut Silent).unwrap()
+}
+
+fn faults<const D: usize>(
+    values: &[f32],
+    grid: &Grid<D>,
+    options: FaultOptions,
+    watch: &mut dyn Watch,
+) -> Result<Vec<FeaturePoint<D>>, EnhanceError> {
+    crate::enhance::thin::crests(&Faults(options), values, grid, watch)
 }
 
 /// The worst and the mean of some seeds.
@@ -211,7 +220,7 @@ fn alike<const D: usize>(a: &[FeaturePoint<D>], b: &[FeaturePoint<D>], near: f64
 #[test]
 fn mirrored_layers_have_mirrored_faults() {
     let shape = [128, 128];
-    let (values, _) = judge::noisy(Scene::Section, shape, 1, 10.0);
+    let (values, _) = noisy(Scene::Section, shape, 1, 10.0);
     let crests = found(&values, shape);
     let mirrored: Vec<f32> = values.chunks(128).flat_map(|row| row.iter().rev().copied()).collect();
     let mut back = found(&mirrored, shape);
@@ -246,7 +255,7 @@ fn spacing_turns_normals_and_nothing_else() {
     let values = layers(shape, age);
     let plain = found(&values, shape);
     let grid = Grid { shape, step: [25.0, 4.0] }; // metres and milliseconds
-    let spaced = faults(&values, &grid, &FaultOptions::default(), &mut Silent).unwrap();
+    let spaced = faults(&values, &grid, FaultOptions::default(), &mut Silent).unwrap();
     assert_eq!(plain.len(), spaced.len());
     for (a, b) in plain.iter().zip(&spaced) {
         assert_eq!((a.index, a.position, a.strength), (b.index, b.position, b.strength));
@@ -261,7 +270,7 @@ fn spacing_turns_normals_and_nothing_else() {
 #[test]
 fn bits_do_not_depend_on_the_number_of_threads() {
     fn same<const D: usize>(scene: Scene, shape: [usize; D]) {
-        let (values, _) = judge::noisy(scene, shape, 2, 3.0);
+        let (values, _) = noisy(scene, shape, 2, 3.0);
         let run = |threads| {
             let pool = ThreadPoolBuilder::new().num_threads(threads).build().unwrap();
             pool.install(|| found(&values, shape))
@@ -298,7 +307,7 @@ fn progress_ascends_and_work_may_be_cancelled_at_any_step() {
     let values = layers(shape, |p| p[2] + if p[0] > 14.5 { 3.0 } else { 0.0 });
     let run = |left| {
         let mut watch = After { left, last: 0.0 };
-        let result = faults(&values, &unit(shape), &FaultOptions::default(), &mut watch);
+        let result = faults(&values, &unit(shape), FaultOptions::default(), &mut watch);
         (result, 1000 - watch.left.min(1000), watch.last)
     };
     let (result, steps, last) = run(1000);
@@ -311,7 +320,7 @@ fn progress_ascends_and_work_may_be_cancelled_at_any_step() {
 #[test]
 fn options_out_of_range_are_refused_by_name() {
     let refused = |options: FaultOptions| {
-        let result = faults(&[0.0, 1.0], &unit([2, 1]), &options, &mut Silent);
+        let result = faults(&[0.0, 1.0], &unit([2, 1]), options, &mut Silent);
         result.unwrap_err().to_string()
     };
     let good = FaultOptions::default();
@@ -323,7 +332,10 @@ fn options_out_of_range_are_refused_by_name() {
         refused(FaultOptions { layer_reach: f64::NAN, ..good }),
         "layer-reach of faults is NaN; expected 1 to 1000"
     );
-    assert_eq!(refused(FaultOptions { low: 1.5, ..good }), "low of faults is 1.5; expected 0 to 1");
+    assert_eq!(
+        refused(FaultOptions { crests: CrestOptions { low: Some(1.5), ..good.crests }, ..good }),
+        "low of faults is 1.5; expected 0 to 1"
+    );
 }
 
 proptest! {
@@ -340,8 +352,14 @@ proptest! {
             let count: usize = shape.iter().product();
             let values: Vec<f32> =
                 (0..count).map(|_| magnitude * (random.random::<f32>() - 0.5)).collect();
-            let options = FaultOptions { low: 0.0, high: 0.0, least_length: 0.0, ..Default::default() };
-            for crest in faults(&values, &unit(shape), &options, &mut Silent).unwrap() {
+            let crests = CrestOptions {
+                low: Some(0.0),
+                high: Some(0.0),
+                least_length: Some(0.0),
+                ..Default::default()
+            };
+            let options = FaultOptions { crests, ..Default::default() };
+            for crest in faults(&values, &unit(shape), options, &mut Silent).unwrap() {
                 let sample = coordinates(crest.index, shape);
                 assert!((0..D).all(|k| (crest.position[k] - sample[k] as f64).abs() <= 0.5));
                 let norm: f64 = crest.normal.iter().map(|n| n * n).sum();

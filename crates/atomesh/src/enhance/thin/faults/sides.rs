@@ -1,8 +1,8 @@
-//! What a layer is like on the two sides of every sample.
+//! The averages of a layer on the two sides of every sample.
 //!
 //! L at a sample is the average of the layer's samples before it, with weights that fall by a constant factor
-//! from each to the next, R of those behind it; neither holds the sample itself. They are made one trace after
-//! another, from the average at the trace before: Lᵤ(z) = (1 − a) fᵤ₋₁(z − p) + a Lᵤ₋₁(z − p), p the layer's slope.
+//! from each to the next, R of those behind it; neither holds the sample itself. Traces are taken one after
+//! another: Lᵤ(z) = (1 − a) fᵤ₋₁(z − p) + a Lᵤ₋₁(z − p), p the layer's slope.
 //! So |L − R| rises to a peak on a break, the sharp one of Shen & Castan's (1992) edge detector.
 
 use super::FaultOptions;
@@ -14,16 +14,17 @@ use rayon::prelude::*;
 /// Samples of one task.
 const BLOCK: usize = 1 << 16;
 
-/// Brings amplitudes to mean 0 and mean square 1.
+/// Amplitudes, brought to mean 0 and mean square 1 while they are read.
 #[derive(Clone, Copy, Debug)]
-pub(super) struct Scale {
+pub(super) struct Amplitudes<'a> {
+    values: &'a [f32],
     mean: f64,
     factor: f64,
 }
 
-impl Scale {
-    /// The scale of amplitudes; `None` if they are all the same.
-    pub fn of(values: &[f32]) -> Option<Self> {
+impl<'a> Amplitudes<'a> {
+    /// `None` if all values are the same.
+    pub fn new(values: &'a [f32]) -> Option<Self> {
         let (&first, rest) = values.split_first()?;
         if rest.iter().all(|&v| v == first) {
             return None;
@@ -35,11 +36,11 @@ impl Scale {
         };
         let mean = sum(&|v| v);
         let deviation = sum(&|v| (v - mean) * (v - mean)).sqrt();
-        (deviation > 0.0).then(|| Self { mean, factor: 1.0 / deviation })
+        (deviation > 0.0).then(|| Self { values, mean, factor: 1.0 / deviation })
     }
 
-    fn apply(&self, value: f32) -> f32 {
-        ((f64::from(value) - self.mean) * self.factor) as f32
+    fn at(&self, index: usize) -> f32 {
+        ((f64::from(self.values[index]) - self.mean) * self.factor) as f32
     }
 }
 
@@ -57,21 +58,21 @@ impl Sides {
     /// # Errors
     /// [`Cancelled`] if the watch ends the work.
     pub fn new(
-        (values, scale): (&[f32], Scale),
+        amplitudes: &Amplitudes<'_>,
         slopes: &[f32],
         facing: &Facing,
         options: &FaultOptions,
         watch: &mut dyn Watch,
     ) -> Result<Self, Cancelled> {
-        let (plane, nz) = (facing.plane(), facing.depth);
-        let mut sides = Self { jump: vec![0.0; values.len()], energy: vec![0.0; values.len()] };
+        let (plane, nz, count) = (facing.plane(), facing.depth, amplitudes.values.len());
+        let mut sides = Self { jump: vec![0.0; count], energy: vec![0.0; count] };
         let traces = |v: usize, of: &dyn Fn(usize) -> f32| -> Vec<f32> {
             let trace = |u| (0..nz).map(move |z| of(facing.index(u, z, v)));
             (0..facing.across).flat_map(trace).collect()
         };
         let keep = (1.0 - 1.0 / options.layer_reach) as f32;
         let work = |v| {
-            let f = traces(v, &|i| scale.apply(values[i]));
+            let f = traces(v, &|i| amplitudes.at(i));
             Walk { f, slope: traces(v, &|i| slopes[i]), count: facing.across, depth: nz, keep }
                 .sides()
         };
@@ -106,12 +107,12 @@ struct Walk {
 }
 
 impl Walk {
-    /// L and R. The image goes on as if mirrored, so that its border is no fault.
+    /// L and R. The image goes on as if mirrored, so that its border does not look like a fault.
     fn sides(&self) -> (Vec<f32>, Vec<f32>) {
         let last = self.count - 1;
         let (mut left, mut right) = (self.f.clone(), self.f.clone());
         let backward = |right: &mut [f32]| (0..last).rev().for_each(|u| self.step(right, u + 1, u));
-        // where one side ends the other begins: once there and back, and there again
+        // where one side ends the other begins: backward, forward, and backward again
         backward(&mut right);
         left[..self.depth].copy_from_slice(&right[..self.depth]);
         (0..last).for_each(|u| self.step(&mut left, u, u + 1));

@@ -1,132 +1,87 @@
 //! Ridges: the middles of lines (2-D) and sheets (3-D) that are brighter, or darker, than what is about them.
 //!
-//! In this order, after Hale (2002):
-//!
-//! 1. the normals of features, from the structure tensor, or from the image's curvature where
-//!    features are too close to each other for the former;
-//! 2. where the smoothed image is brighter than the background, the zero crossings of its derivative along the
-//!    normal at which it is greatest;
-//! 3. groups of crests that are strong somewhere, nowhere faint, and large enough.
+//! After Hale (2002). The field is the smoothed image, less the background. The direction is the normal of features, from
+//! the structure tensor, or from the image's curvature where features are too close to each other for a tensor. Crests
+//! are where the derivative along the normal crosses zero, on the bright side of the background.
 //!
 //! The background is the median; a full feature is as bright as the 98th percentile of all crests. Departure
-//! from Hale: crossings are found between samples, so that what is made of them is alike at any slant.
+//! from Hale: crossings are found between samples, so that valleys made of them are alike at any slant.
 
-use super::crossings::{Polarity, Unit, crossings, scale_strengths};
-use super::{EnhanceError, LEAST_EDGE_SCALE, LONGEST, MOST_EXTENT, within};
-use crate::crests::{FeaturePoint, Hysteresis, linked};
+use super::crossings::{Row, crossings, scale_strengths};
+use super::unit::UnitValues;
+use super::{CrestOptions, Finder, Polarity, Thresholds};
+use crate::crests::FeaturePoint;
+use crate::enhance::EnhanceError;
 use crate::geometry::linear::largest_eigenpair;
 use crate::image::{Grid, StructureTensor};
-use crate::watch::{Phase, Watch, check};
-use serde::{Deserialize, Serialize};
+use crate::watch::Watch;
 
-/// How ridges are found.
-#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
-#[serde(default, deny_unknown_fields, rename_all = "kebab-case")]
-pub struct RidgeOptions {
-    /// Which ridges: those brighter or darker than what is about them, or both. Default: bright.
-    pub polarity: Polarity,
-    /// Standard deviation of the Gaussian whose derivatives are taken, in least steps. Default 1.5: as wide as
-    /// features of three samples, and blind to what is finer. Hale's (2002) is 3.
-    pub scale: f64,
-    /// Standard deviation of the Gaussian that smooths the structure tensor, in least steps. 0 takes normals from the second
-    /// derivatives at each sample instead, for features that cross or lie close together. Default 12, Hale's (2002).
-    pub normal_scale: f64,
-    /// How strong crests must be, 0…1 between the background and a full feature. Default 0.3.
-    pub low: f32,
-    /// How strong a group of crests must be somewhere, 0…1. Default 0.5.
-    pub high: f32,
-    /// The least length of a line, in samples; the least area of a sheet is its square. Default 10.
-    pub least_length: f64,
-}
+/// Finds ridges.
+pub(super) struct Ridges(pub CrestOptions);
 
-impl Default for RidgeOptions {
-    fn default() -> Self {
-        let polarity = Polarity::default();
-        Self { polarity, scale: 1.5, normal_scale: 12.0, low: 0.3, high: 0.5, least_length: 10.0 }
+/// See [`CrestOptions::scale`].
+const SCALE: f64 = 1.5;
+
+/// See [`CrestOptions::normal_scale`].
+const NORMAL_SCALE: f64 = 12.0;
+
+impl<const D: usize> Finder<D> for Ridges {
+    const KIND: &'static str = "ridges";
+    const THRESHOLDS: Thresholds = Thresholds { low: 0.3, high: 0.5, least_length: 10.0 };
+
+    fn options(&self) -> &CrestOptions {
+        &self.0
     }
-}
 
-impl RidgeOptions {
-    /// Refuses what is out of range.
-    fn check(&self) -> Result<(), EnhanceError> {
-        within(
-            "ridges",
-            &[
-                ("scale", self.scale, LEAST_EDGE_SCALE, LONGEST),
-                ("normal-scale", self.normal_scale, 0.0, LONGEST),
-                ("low", self.low.into(), 0.0, 1.0),
-                ("high", self.high.into(), 0.0, 1.0),
-                ("least-length", self.least_length, 0.0, MOST_EXTENT),
-            ],
-        )
-    }
-}
-
-/// How many crests a group has at least whose features are at least so long.
-pub(super) fn least_count<const D: usize>(length: f64) -> usize {
-    length.max(0.0).powi(D as i32 - 1).ceil() as usize
-}
-
-/// The ridges of an image of finite values; none if it is constant.
-///
-/// # Errors
-/// [`EnhanceError::Option`] for an option out of its range, [`EnhanceError::Cancelled`] if the watch ends the
-/// work.
-///
-/// # Panics
-/// If there are not as many values as the grid's shape says.
-pub(crate) fn ridges<const D: usize>(
-    values: &[f32],
-    grid: &Grid<D>,
-    options: &RidgeOptions,
-    watch: &mut dyn Watch,
-) -> Result<Vec<FeaturePoint<D>>, EnhanceError> {
-    options.check()?;
-    let Some(unit) = Unit::new(values) else { return Ok(Vec::new()) };
-    check(watch, Phase::Potential, 0.0, None)?;
-    let grid = grid.in_least_steps();
-    let signs: &[f32] = match options.polarity {
-        Polarity::Bright => &[1.0],
-        Polarity::Dark => &[-1.0],
-        Polarity::Both => &[1.0, -1.0],
-    };
-    let background = unit.quantile(0.5);
-    let smooth = grid.step.map(|step| options.normal_scale / step);
-    let tensor = if options.normal_scale > 0.0 {
-        Some(StructureTensor::new(values, &grid, options.scale, smooth, watch)?)
-    } else {
-        None
-    };
-    let visit = |row: &super::crossings::Row<D>, crests: &mut Vec<FeaturePoint<D>>| {
-        let normals = tensor.as_ref().and_then(|tensor| tensor.row(row.sample));
-        for (x, &value) in row.average.iter().enumerate() {
-            if value <= 0.0 {
-                continue;
-            }
-            let normal = match &normals {
-                Some(normals) => normals.normal(x).0,
-                None => across(row.hessian(x)),
-            };
-            if let Some((offset, slope)) = row.summit(&normal, x, 1.0) {
-                crests.extend(row.crest(x, normal, offset, value + 0.5 * slope * offset));
-            }
-        }
-    };
-    let mut crests = Vec::new();
-    for sign in signs {
-        let fill = |start: usize, out: &mut [f32]| {
-            unit.fill(start, out);
-            out.iter_mut().for_each(|v| *v = sign * (*v - background));
+    fn points(
+        &self,
+        values: &[f32],
+        grid: &Grid<D>,
+        watch: &mut dyn Watch,
+    ) -> Result<Vec<FeaturePoint<D>>, EnhanceError> {
+        let Some(unit) = UnitValues::new(values) else { return Ok(Vec::new()) };
+        let grid = grid.in_least_steps();
+        let scale = self.0.scale.unwrap_or(SCALE);
+        let normal_scale = self.0.normal_scale.unwrap_or(NORMAL_SCALE);
+        let signs: &[f32] = match self.0.polarity.unwrap_or_default() {
+            Polarity::Bright => &[1.0],
+            Polarity::Dark => &[-1.0],
+            Polarity::Both => &[1.0, -1.0],
         };
-        crests.extend(crossings(fill, &grid, options.scale, visit, watch)?);
+        let background = unit.quantile(0.5);
+        let smooth = grid.step.map(|step| normal_scale / step);
+        let tensor = if normal_scale > 0.0 {
+            Some(StructureTensor::new(values, &grid, scale, smooth, watch)?)
+        } else {
+            None
+        };
+        let visit = |row: &Row<D>, crests: &mut Vec<FeaturePoint<D>>| {
+            let normals = tensor.as_ref().and_then(|tensor| tensor.row(row.sample));
+            for (x, &value) in row.average.iter().enumerate() {
+                if value <= 0.0 {
+                    continue;
+                }
+                let normal = match &normals {
+                    Some(normals) => normals.normal(x).0,
+                    None => across(row.hessian(x)),
+                };
+                if let Some(top) = row.summit(&normal, x, 1.0) {
+                    let height = value + 0.5 * top.slope * top.offset;
+                    crests.extend(row.crest(x, normal, top.offset, height));
+                }
+            }
+        };
+        let mut crests = Vec::new();
+        for sign in signs {
+            let fill = |start: usize, out: &mut [f32]| {
+                unit.fill(start, out);
+                out.iter_mut().for_each(|v| *v = sign * (*v - background));
+            };
+            crests.extend(crossings(fill, &grid, scale, visit, watch)?);
+        }
+        scale_strengths(&mut crests);
+        Ok(crests)
     }
-    scale_strengths(&mut crests);
-    let least = least_count::<D>(options.least_length);
-    Ok(linked(
-        crests,
-        grid.shape,
-        Hysteresis { low: options.low.into(), high: options.high.into(), least_count: least },
-    ))
 }
 
 /// The direction in which the image is bent downwards most.
@@ -157,9 +112,9 @@ mod tests {
     fn found<const D: usize>(
         values: &[f32],
         grid: &Grid<D>,
-        options: &RidgeOptions,
+        options: CrestOptions,
     ) -> Vec<FeaturePoint<D>> {
-        ridges(values, grid, options, &mut Silent).unwrap()
+        super::super::crests(&Ridges(options), values, grid, &mut Silent).unwrap()
     }
 
     /// Crests of a tilted Gaussian sheet are on it.
@@ -168,8 +123,8 @@ mod tests {
         let values: Vec<f32> = (0..grid.sample_count())
             .map(|i| (-0.5 * (across_middle(&grid, normal, i) / width).powi(2)).exp() as f32)
             .collect();
-        let options = RidgeOptions { normal_scale, ..Default::default() };
-        let crests = found(&values, &grid, &options);
+        let options = CrestOptions { normal_scale: Some(normal_scale), ..Default::default() };
+        let crests = found(&values, &grid, options);
         let inner = |k: usize, i: usize| (7..grid.shape[k] - 7).contains(&i);
         let mut count = 0;
         for crest in &crests {
@@ -220,8 +175,8 @@ mod tests {
     #[test]
     fn crests_of_a_ring_are_on_it_and_close() {
         let grid = Grid { shape: [51, 51], step: [1.0; 2] };
-        let options = RidgeOptions { normal_scale: 2.0, ..Default::default() };
-        let crests = found(&ring(51), &grid, &options);
+        let options = CrestOptions { normal_scale: Some(2.0), ..Default::default() };
+        let crests = found(&ring(51), &grid, options);
         let mut angles: Vec<f64> = Vec::new();
         for crest in crests {
             let [x, y] = crest.position.map(|p| p - 25.0);
@@ -240,9 +195,11 @@ mod tests {
         let grid = Grid { shape: [51, 51], step: [1.0; 2] };
         let dark = ring(51);
         let bright: Vec<f32> = dark.iter().map(|v| 5.0 - v).collect();
-        let options = RidgeOptions { normal_scale: 2.0, ..Default::default() };
-        let [a, b] = [(&dark, Polarity::Dark), (&bright, Polarity::Bright)]
-            .map(|(values, polarity)| found(values, &grid, &RidgeOptions { polarity, ..options }));
+        let options = CrestOptions { normal_scale: Some(2.0), ..Default::default() };
+        let [a, b] =
+            [(&dark, Polarity::Dark), (&bright, Polarity::Bright)].map(|(values, polarity)| {
+                found(values, &grid, CrestOptions { polarity: Some(polarity), ..options })
+            });
         assert!(!a.is_empty() && a.len() == b.len());
         for (a, b) in a.iter().zip(&b) {
             assert_eq!(a.index, b.index);
@@ -257,17 +214,17 @@ mod tests {
             |x: usize, y: usize| y == 8 && (5..55).contains(&x) || y == 22 && (20..26).contains(&x);
         let values: Vec<f32> =
             (0..1800).map(|i| if on(i % 60, i / 60) { 1.0 } else { 0.0 }).collect();
-        let options = RidgeOptions {
-            polarity: Polarity::Bright,
-            normal_scale: 4.0,
-            least_length: 20.0,
+        let options = CrestOptions {
+            polarity: Some(Polarity::Bright),
+            normal_scale: Some(4.0),
+            least_length: Some(20.0),
             ..Default::default()
         };
-        let crests = found(&values, &grid, &options);
+        let crests = found(&values, &grid, options);
         assert!(
             crests.iter().all(|crest| (7..10).contains(&(crest.index / 60))) && crests.len() > 40
         );
-        let all = found(&values, &grid, &RidgeOptions { least_length: 0.0, ..options });
+        let all = found(&values, &grid, CrestOptions { least_length: Some(0.0), ..options });
         assert!(all.iter().any(|crest| crest.index / 60 == 22));
     }
 
@@ -276,12 +233,15 @@ mod tests {
         for shape in [[7, 5, 1], [1, 1, 1], [1, 9, 4], [2, 2, 2]] {
             let grid = Grid { shape, step: [1.0; 3] };
             let count = grid.sample_count();
-            assert!(found(&vec![3.0; count], &grid, &RidgeOptions::default()).is_empty());
+            assert!(found(&vec![3.0; count], &grid, CrestOptions::default()).is_empty());
             let values: Vec<f32> = (0..count).map(|i| (i * 7 % 5) as f32).collect();
             for normal_scale in [0.0, 12.0] {
-                let options =
-                    RidgeOptions { normal_scale, least_length: 0.0, ..Default::default() };
-                for crest in found(&values, &grid, &options) {
+                let options = CrestOptions {
+                    normal_scale: Some(normal_scale),
+                    least_length: Some(0.0),
+                    ..Default::default()
+                };
+                for crest in found(&values, &grid, options) {
                     let sample = coordinates(crest.index, shape);
                     assert!((0..3).all(|k| (crest.position[k] - sample[k] as f64).abs() <= 0.6001));
                     assert!((0.0..=1.0).contains(&crest.strength));
@@ -300,8 +260,8 @@ mod tests {
             .for_each(|(i, v)| *v -= ((i * i * 7919) % 1009) as f32 * 4e-4);
         let backwards: Vec<f32> = values.iter().rev().copied().collect();
         let swapped: Vec<f32> = (0..2601).map(|i| values[i % 51 * 51 + i / 51]).collect();
-        let options = RidgeOptions { normal_scale: 3.0, ..Default::default() };
-        let crests = found(&values, &grid, &options);
+        let options = CrestOptions { normal_scale: Some(3.0), ..Default::default() };
+        let crests = found(&values, &grid, options);
         let near = |others: Vec<FeaturePoint<2>>, back: &dyn Fn([f64; 2]) -> [f64; 2]| {
             let same = |a: &FeaturePoint<2>| {
                 others.iter().any(|b| {
@@ -313,8 +273,8 @@ mod tests {
         };
         // rounding may decide of crests at the edge of a threshold
         let least = crests.len() * 99 / 100;
-        assert!(near(found(&backwards, &grid, &options), &|[x, y]| [50.0 - x, 50.0 - y]) >= least);
-        assert!(near(found(&swapped, &grid, &options), &|[x, y]| [y, x]) >= least);
+        assert!(near(found(&backwards, &grid, options), &|[x, y]| [50.0 - x, 50.0 - y]) >= least);
+        assert!(near(found(&swapped, &grid, options), &|[x, y]| [y, x]) >= least);
         assert!(crests.len() > 80);
     }
 
@@ -325,7 +285,7 @@ mod tests {
             (0..grid.sample_count()).map(|i| ((i * i * 7919 + 3 * i) % 1999) as f32).collect();
         let run = |threads| {
             let pool = rayon::ThreadPoolBuilder::new().num_threads(threads).build().unwrap();
-            pool.install(|| found(&values, &grid, &RidgeOptions::default()))
+            pool.install(|| found(&values, &grid, CrestOptions::default()))
         };
         let one = run(1);
         assert!(!one.is_empty() && one == run(3) && one == run(8));

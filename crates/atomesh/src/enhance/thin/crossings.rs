@@ -1,83 +1,31 @@
-//! Where derivatives along a direction cross zero, between samples: how features are thinned to crests.
+//! Non-maximum suppression between samples: where derivatives along a direction cross zero.
 //!
-//! An image is smoothed and differentiated plane by plane; three planes at a time are held, and of each row
-//! of samples its neighbours can be asked. Slopes are those of the smoothed image, and taken to be linear, or
-//! a parabola, between samples. Outside the image samples are mirrored, so that a slope along an axis
-//! has the other sign there.
+//! The image is smoothed and differentiated plane by plane. Three planes are held at a time, so that each row of samples
+//! knows its neighbours. Slopes are those of the smoothed image, linear or a parabola between samples. Outside the image
+//! samples are mirrored, so that a slope along an axis has the other sign there.
 //!
 //! Cost: O(σ) per sample, and what the visitor does. Memory: a few planes a thread, and the crests.
 
-use super::quantile::{Order, Ranks};
 use crate::crests::FeaturePoint;
+use crate::enhance::quantile::{Order, Ranks};
 use crate::image::{Grid, Run, Stencil, Stream, coordinates};
 use crate::watch::{Cancelled, Phase, Watch, check};
 use rayon::prelude::*;
-use serde::{Deserialize, Serialize};
 use std::collections::VecDeque;
 use std::ops::Range;
 
-/// Which of the lines and sheets along which an image is extreme count.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
-#[serde(rename_all = "lowercase")]
-#[non_exhaustive]
-pub enum Polarity {
-    /// Those brighter than what is about them; of amplitudes, peaks.
-    #[default]
-    Bright,
-    /// Those darker than what is about them; of amplitudes, troughs.
-    Dark,
-    /// Both.
-    Both,
-}
-
-/// How far from its sample a crest may be along any axis, in samples: half, and what rounding and
-/// differences may be off, lest crests have gaps.
+/// The greatest distance of a crest from its sample along any axis, in samples: half a sample, and the error of rounding
+/// and differences, lest crests have gaps.
 const REACH: f32 = 0.6;
 
-/// Of all crests, the share that is given full strength.
+/// The share of all crests that have full strength.
 const CLIPPED: f64 = 0.02;
 
-/// Samples between two looks at whether to go on: a fraction of a second's work.
+/// Samples between two looks at the watch: a fraction of a second's work.
 const BATCH_SAMPLES: usize = 1 << 24;
 
-/// An image's values, moved and scaled to 0…1 as they are read.
-#[derive(Clone, Copy)]
-pub(super) struct Unit<'a> {
-    values: &'a [f32],
-    least: f64,
-    scale: f64,
-}
-
-impl<'a> Unit<'a> {
-    /// `None` if all values are the same.
-    pub(super) fn new(values: &'a [f32]) -> Option<Self> {
-        let ends = |part: &[f32]| {
-            part.iter().fold((f32::MAX, f32::MIN), |(a, b), &v| (a.min(v), b.max(v)))
-        };
-        let both = |a: (f32, f32), b: (f32, f32)| (a.0.min(b.0), a.1.max(b.1));
-        let (least, greatest) =
-            values.par_chunks(1 << 16).map(ends).reduce(|| (f32::MAX, f32::MIN), both);
-        let (least, greatest) = (f64::from(least), f64::from(greatest));
-        (greatest > least).then(|| Self { values, least, scale: 1.0 / (greatest - least) })
-    }
-
-    /// Writes values from index `start` on.
-    pub(super) fn fill(&self, start: usize, out: &mut [f32]) {
-        for (out, &v) in out.iter_mut().zip(&self.values[start..]) {
-            *out = ((f64::from(v) - self.least) * self.scale) as f32;
-        }
-    }
-
-    /// The value that a share of all others is below.
-    pub(super) fn quantile(&self, share: f64) -> f32 {
-        let count = self.values.len();
-        let order = Order::new(count, |start, out: &mut [f32]| self.fill(start, out));
-        order.ranked((share * count as f64) as usize).value
-    }
-}
-
-/// Crests that `visit` finds, row by row, in an image that `fill(start, out)` writes, smoothed by a Gaussian of
-/// `sigma` least steps; in the order of their samples.
+/// The crests that `visit` finds, row by row, in the order of their samples. The image is what `fill(start, out)` writes,
+/// smoothed by a Gaussian of `sigma` least steps.
 ///
 /// # Errors
 /// [`Cancelled`] if the watch ends the work.
@@ -109,10 +57,8 @@ pub(super) fn crossings<const D: usize>(
     Ok(crests)
 }
 
-/// Scales strengths so that all but a few of the strongest crests are within 0…1, and clips these to 1.
-///
-/// Returns what a strength of 1 was before.
-pub(super) fn scale_strengths<const D: usize>(crests: &mut [FeaturePoint<D>]) -> f32 {
+/// Scales strengths to 0…1: the strongest 2 % of all crests, and those as strong as the weakest of these, have 1.
+pub(super) fn scale_strengths<const D: usize>(crests: &mut [FeaturePoint<D>]) {
     let strengths: Vec<f32> = crests.iter().map(|crest| (crest.strength as f32).max(0.0)).collect();
     let count = strengths.len();
     let order = Order::new(count, |start, out: &mut [f32]| {
@@ -125,22 +71,24 @@ pub(super) fn scale_strengths<const D: usize>(crests: &mut [FeaturePoint<D>]) ->
             crest.strength = (crest.strength as f32 / full).clamp(0.0, 1.0).into();
         }
     }
-    full
 }
 
 /// The smoothed image of one plane, and its slopes.
-struct Fields<const D: usize> {
+struct Plane<const D: usize> {
     average: Vec<f32>,
     slopes: [Vec<f32>; D],
 }
 
-/// The planes that one task holds, the first of which has this number, and what was found.
+/// The planes that one task holds, and what was found in them.
 struct Window<const D: usize> {
     grid: Grid<D>,
+    /// The numbers of the planes that are visited.
     wanted: Range<usize>,
+    /// The number of the first plane held.
     first: usize,
-    planes: VecDeque<Fields<D>>,
-    spare: Vec<Fields<D>>,
+    planes: VecDeque<Plane<D>>,
+    /// Planes no longer needed, to be filled again.
+    spare: Vec<Plane<D>>,
     crests: Vec<FeaturePoint<D>>,
 }
 
@@ -151,22 +99,22 @@ impl<const D: usize> Window<D> {
         Self { grid, wanted, first, planes, spare, crests: Vec::new() }
     }
 
-    /// Keeps a run, and visits the rows of the planes whose neighbours have come.
+    /// Takes a run in, and visits the rows of the planes whose neighbours are there.
     fn take(&mut self, run: &Run<D>, visit: &impl Fn(&Row<D>, &mut Vec<FeaturePoint<D>>)) {
-        let plane: usize = self.grid.shape[..D - 1].iter().product();
+        let size: usize = self.grid.shape[..D - 1].iter().product();
         while self.first + self.planes.len() <= run.plane {
-            self.planes.push_back(self.spare.pop().unwrap_or_else(|| Fields {
-                average: vec![0.0; plane],
-                slopes: std::array::from_fn(|_| vec![0.0; plane]),
+            self.planes.push_back(self.spare.pop().unwrap_or_else(|| Plane {
+                average: vec![0.0; size],
+                slopes: std::array::from_fn(|_| vec![0.0; size]),
             }));
         }
-        let fields = &mut self.planes[run.plane - self.first];
+        let plane = &mut self.planes[run.plane - self.first];
         let end = run.column + run.average.len();
-        fields.average[run.column..end].copy_from_slice(run.average);
-        for (slopes, run_slopes) in fields.slopes.iter_mut().zip(run.slopes) {
+        plane.average[run.column..end].copy_from_slice(run.average);
+        for (slopes, run_slopes) in plane.slopes.iter_mut().zip(run.slopes) {
             slopes[run.column..end].copy_from_slice(run_slopes);
         }
-        if end < plane {
+        if end < size {
             return;
         }
         if run.plane > 0 && self.wanted.contains(&(run.plane - 1)) {
@@ -200,8 +148,8 @@ impl<const D: usize> Window<D> {
         self.crests = crests;
     }
 
-    /// The row beside that of a sample; the digits of `code` to base 3 are the steps along the axes but the
-    /// first, plus 1.
+    /// The row beside that of a sample. The digits of `code` to base 3 are 1 plus the steps along the second axis and the
+    /// third.
     fn beside(&self, sample: [usize; D], mut code: usize) -> Beside<'_, D> {
         let (mut start, mut stride, mut plane) = (0, 1, sample[D - 1]);
         let mut signs = [1.0; D];
@@ -222,9 +170,18 @@ impl<const D: usize> Window<D> {
             }
             stride *= self.grid.shape[k];
         }
-        let (n, fields) = (self.grid.shape[0], &self.planes[plane - self.first]);
-        Beside { slopes: fields.slopes.each_ref().map(|s| &s[start..start + n]), signs }
+        let (n, plane) = (self.grid.shape[0], &self.planes[plane - self.first]);
+        Beside { slopes: plane.slopes.each_ref().map(|s| &s[start..start + n]), signs }
     }
+}
+
+/// An extreme along a normal through a sample.
+#[derive(Clone, Copy)]
+pub(super) struct Summit {
+    /// Its distance from the sample along the normal, in lattice units.
+    pub(super) offset: f32,
+    /// The slope of the smoothed image along the normal: at the sample, or, of the steepest place, there.
+    pub(super) slope: f32,
 }
 
 /// A row of slopes, and the sign that each has as a neighbour's.
@@ -234,7 +191,7 @@ struct Beside<'a, const D: usize> {
     signs: [f32; D],
 }
 
-/// A row of samples along the first axis, whose neighbours can be asked.
+/// A row of samples along the first axis, which knows its neighbours.
 pub(super) struct Row<'a, const D: usize> {
     /// Its first sample.
     pub(super) sample: [usize; D],
@@ -242,7 +199,7 @@ pub(super) struct Row<'a, const D: usize> {
     pub(super) index: usize,
     /// The smoothed image.
     pub(super) average: &'a [f32],
-    /// Rows by the steps to them; in the plane only the first three are.
+    /// Rows by the steps to them; in the plane the first three count.
     beside: [Beside<'a, D>; 9],
     grid: &'a Grid<D>,
 }
@@ -272,12 +229,12 @@ impl<const D: usize> Row<'_, D> {
         sum
     }
 
-    /// How far along a normal from sample `x` the smoothed image is greatest (`sign` 1) or least (−1), and its
-    /// slope at the sample; `None` if it is neither near.
+    /// Where along a normal through sample `x` the smoothed image is greatest (`sign` 1) or least (−1); `None` if it
+    /// is not bent that way.
     ///
     /// The zero crossing of the slope, linear from the sample to its neighbours uphill: for a Gaussian
     /// ridge of deviation s this is off by 0.05/s² samples at most.
-    pub(super) fn summit(&self, normal: &[f32; D], x: usize, sign: f32) -> Option<(f32, f32)> {
+    pub(super) fn summit(&self, normal: &[f32; D], x: usize, sign: f32) -> Option<Summit> {
         let here = sign * self.slope(normal, x, [0; D]);
         let mut bend = 0.0;
         for k in 0..D {
@@ -285,15 +242,15 @@ impl<const D: usize> Row<'_, D> {
             let there = sign * self.slope(normal, x, step::<D>(k, uphill));
             bend += normal[k] * uphill as f32 * (there - here) / self.grid.step[k] as f32;
         }
-        (bend < 0.0).then(|| (-here / bend, sign * here))
+        (bend < 0.0).then(|| Summit { offset: -here / bend, slope: sign * here })
     }
 
-    /// How far along a normal from sample `x` the slope along it is greatest, and how great; `None` if it is
-    /// not near, or the slope at the sample or a neighbour is not uphill.
+    /// Where along a normal through sample `x` the slope along it is greatest; `None` if the slope is not bent
+    /// downwards, or not uphill at the sample and all neighbours.
     ///
-    /// The top of a parabola, along the normal, through the logarithms of slopes at the sample and its neighbours, also those at
-    /// corners: exact for the bell that a smoothed step's slope is.
-    pub(super) fn steepest(&self, normal: &[f32; D], x: usize) -> Option<(f32, f32)> {
+    /// The top of a parabola, along the normal, through the logarithms of slopes at the sample and its neighbours, those
+    /// at corners among them: exact for the bell that a smoothed step's slope is.
+    pub(super) fn steepest(&self, normal: &[f32; D], x: usize) -> Option<Summit> {
         let log = |steps| self.slope(normal, x, steps).ln(); // NaN is caught below
         let weights: [f32; D] = std::array::from_fn(|k| normal[k] / self.grid.step[k] as f32);
         let here = log([0; D]);
@@ -313,7 +270,8 @@ impl<const D: usize> Row<'_, D> {
             }
         }
         let offset = -rise / bend;
-        (bend < 0.0 && offset.is_finite()).then(|| (offset, (here + 0.5 * rise * offset).exp()))
+        let slope = (here + 0.5 * rise * offset).exp();
+        (bend < 0.0 && offset.is_finite()).then_some(Summit { offset, slope })
     }
 
     /// Second derivatives of the smoothed image, per squared lattice unit.
@@ -336,7 +294,7 @@ impl<const D: usize> Row<'_, D> {
     ) -> Option<FeaturePoint<D>> {
         let steps: [f32; D] =
             std::array::from_fn(|k| offset * normal[k] / self.grid.step[k] as f32);
-        // NaN is no step
+        // false for NaN
         if !steps.iter().all(|step| step.abs() <= REACH) {
             return None;
         }

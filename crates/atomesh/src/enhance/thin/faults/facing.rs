@@ -5,8 +5,8 @@ use rayon::prelude::*;
 
 /// Which horizontal axis the faults face, within 45°, and how the samples are ordered for their scan.
 ///
-/// u is the place along that axis, `depth` along the last, v along the other horizontal axis, which a section
-/// has one sample of. Upright planes, of constant v, lie one after another, and in them rows of u.
+/// u is the place along that axis, `depth` along the last, and v along the other horizontal axis, along which a section
+/// has one sample. Upright planes, of constant v, lie one after another, each in rows along u.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Facing {
     /// The axis faced: 0 or 1.
@@ -46,7 +46,7 @@ impl Facing {
     }
 }
 
-/// Does `work` for every number below `count`, some at a time, and hands results to `keep` in order.
+/// Does `work` for every number below `count`, a batch at a time, and hands results to `keep` in order.
 ///
 /// # Errors
 /// [`Cancelled`] if the watch ends the work.

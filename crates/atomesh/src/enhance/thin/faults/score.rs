@@ -1,20 +1,20 @@
-//! Judges crests by the truth of synthetic layers.
+//! Recall and precision of crests, by the truth of synthetic layers.
 //!
 //! A crest is right if a fault is within two samples of it: their share is the *precision*. The truth is sampled a
 //! sample apart on each fault's disk, where that is inside the image; a sample is found if a crest is within two
 //! samples of it, and the share found is the *recall*: of all of the surface, and of that where layers are
 //! torn apart by a sample or more. At a disk's rim the throw is 0 and nothing can be seen.
 
-use super::{FaultOptions, faults};
+use super::{FaultOptions, Faults};
 use crate::crests::FeaturePoint;
 use crate::geometry::{Point, dot};
 use crate::synth::{Geometry, Scene, SynthOptions, Synthetic, Truth, synthesize};
 use crate::watch::Silent;
 
-/// How near is found, in samples.
+/// The greatest distance of a crest from a fault that it finds, in samples.
 const NEAR: f64 = 2.0;
 
-/// What crests are worth, as shares.
+/// Shares of what is found, and of what is right.
 #[derive(Clone, Copy, Debug, Default)]
 pub(super) struct Score {
     /// Recall of all of the faults.
@@ -61,25 +61,43 @@ pub(super) fn score<const D: usize>(
     decibels: f64,
 ) -> Score {
     let (values, truth) = noisy(scene, shape, seed, decibels);
-    let crests = faults(&values, &truth.grid, &FaultOptions::default(), &mut Silent).unwrap();
-    judge(&crests, &truth)
+    let finder = Faults(FaultOptions::default());
+    let crests = crate::enhance::thin::crests(&finder, &values, &truth.grid, &mut Silent).unwrap();
+    score_of(&crests, &truth)
 }
 
 /// The score of crests.
-pub(super) fn judge<const D: usize>(crests: &[FeaturePoint<D>], truth: &Truth<D>) -> Score {
+fn score_of<const D: usize>(crests: &[FeaturePoint<D>], truth: &Truth<D>) -> Score {
     let right = |c: &&FeaturePoint<D>| truth.distance(&c.position) <= NEAR;
     let precision = crests.iter().filter(right).count() as f64 / crests.len().max(1) as f64;
     let bins = Bins::new(crests, truth.grid.shape);
-    let (mut all, mut thrown) = ((0, 0), (0, 0));
+    let (mut all, mut thrown) = (Found::default(), Found::default());
     for p in surface(truth) {
-        let found = usize::from(bins.near(&p));
-        all = (all.0 + found, all.1 + 1);
+        let found = bins.near(&p);
+        all.add(found);
         if throw(truth, &p) >= 1.0 {
-            thrown = (thrown.0 + found, thrown.1 + 1);
+            thrown.add(found);
         }
     }
-    let share = |(part, whole): (usize, usize)| part as f64 / whole.max(1) as f64;
-    Score { all: share(all), thrown: share(thrown), precision }
+    Score { all: all.share(), thrown: thrown.share(), precision }
+}
+
+/// How many samples of a surface are found.
+#[derive(Default)]
+struct Found {
+    part: usize,
+    whole: usize,
+}
+
+impl Found {
+    fn add(&mut self, found: bool) {
+        self.part += usize::from(found);
+        self.whole += 1;
+    }
+
+    fn share(&self) -> f64 {
+        self.part as f64 / self.whole.max(1) as f64
+    }
 }
 
 /// By how much the age of layers jumps nearby, in samples of depth.
@@ -136,7 +154,7 @@ fn tangents<const D: usize>(normal: &Point<D>) -> Vec<Point<D>> {
     basis.split_off(1)
 }
 
-/// Crests by cells twice as wide as near is.
+/// Crests by the cells that they lie in, four samples wide.
 struct Bins<'a, const D: usize> {
     counts: [usize; D],
     cells: Vec<Vec<&'a FeaturePoint<D>>>,
