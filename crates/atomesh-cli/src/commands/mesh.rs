@@ -6,7 +6,7 @@ use std::time::Duration;
 
 use atomesh::improve::ImproveReport;
 use atomesh::measure::ShapeReport;
-use atomesh::voronoi::PolyReport;
+use atomesh::mesh::PolyReport;
 use atomesh_job::mesh::{Expectation, MeshFileOptions, MeshSummary, expect, mesh_file};
 use atomesh_job::options::RunConfig;
 use atomesh_job::{JobError, memory};

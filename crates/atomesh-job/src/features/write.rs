@@ -2,8 +2,8 @@
 
 use std::path::Path;
 
-use atomesh::features::{FeatureSet, is_feature_name};
-use atomesh::mesh::Tags;
+use atomesh::features::FeatureSet;
+use atomesh::mesh::{Tags, is_feature_name};
 use atomesh_io::mesh::{LoadedMesh, MeshData, MeshFormat, write_mesh};
 use atomesh_io::surface::{SurfaceFormat, write_surface};
 use serde_json::json;

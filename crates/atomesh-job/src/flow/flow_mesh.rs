@@ -2,11 +2,10 @@
 
 use std::path::Path;
 
-use atomesh::features::FeatureFacetOptions;
+use atomesh::features::{FeatureFaces, FeatureFacetOptions};
 use atomesh::image::{Frame, Image, Units};
-use atomesh::mesh::{Mesh, Tags};
+use atomesh::mesh::{Mesh, PolyMesh, Tags};
 use atomesh::run::{Outcome, Prepared};
-use atomesh::voronoi::{FeatureFaces, PolyMesh};
 use atomesh_flow::Grid;
 use atomesh_io::mesh::cells::{AnyCells, CellReadError, LoadedCells, read_cells};
 use atomesh_io::mesh::{AnyMesh, LoadedMesh, OwnedField, Provenance};
@@ -141,7 +140,7 @@ impl<const D: usize> FlowMesh<D> {
     pub(super) fn of_prepared(
         run: &RunConfig,
         flow: &FlowOptions,
-        prepared: Prepared<'_, D>,
+        prepared: Prepared<D>,
         session: &mut Session<'_>,
     ) -> Result<Self, JobError> {
         check_wells(run, flow, &prepared)?;
@@ -182,7 +181,7 @@ impl<const D: usize> FlowMesh<D> {
 fn check_wells<const D: usize>(
     run: &RunConfig,
     flow: &FlowOptions,
-    prepared: &Prepared<'_, D>,
+    prepared: &Prepared<D>,
 ) -> Result<(), JobError> {
     let frame = prepared.frame();
     for (option, well) in flow.wells() {

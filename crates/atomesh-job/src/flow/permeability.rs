@@ -3,7 +3,7 @@
 use std::path::Path;
 
 use atomesh::image::Image;
-use atomesh::sample::{Cells, SampleOptions, Statistic, sample};
+use atomesh::sample::{CellSurfaces, SampleOptions, Statistic, sample};
 use atomesh_flow::Permeability;
 
 use super::flow_mesh::{FlowMesh, FlowMeshCells};
@@ -41,7 +41,7 @@ pub(super) fn permeability<const D: usize>(
 
 /// The mean of the samples in each cell.
 fn means<const D: usize>(
-    cells: &impl Cells<D>,
+    cells: &impl CellSurfaces<D>,
     image: &Image<D>,
     statistic: Statistic,
     path: &Path,

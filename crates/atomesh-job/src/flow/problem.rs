@@ -1,6 +1,6 @@
 //! From options to a problem on a grid.
 
-use atomesh::features::is_feature_name;
+use atomesh::mesh::is_feature_name;
 use atomesh_flow::{Barrier, Control, Grid, Permeability, Problem, Well};
 
 use super::options::FlowOptions;

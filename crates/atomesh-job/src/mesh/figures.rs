@@ -4,8 +4,8 @@ use std::path::Path;
 
 use atomesh::image::Image;
 use atomesh::measure::{AlignmentReport, ShapeReport, shape};
+use atomesh::mesh::PolyReport;
 use atomesh::run::{MeshReport, Outcome, RunError, VoronoiReport};
-use atomesh::voronoi::PolyReport;
 use atomesh_draw::Style;
 use serde_json::{Map, Value, json};
 

@@ -38,12 +38,12 @@ use write::Writing;
 ///
 /// # Errors
 /// [`JobError`] if options make no sense or an image is of no use.
-pub fn prepare<'m, const D: usize>(
+pub fn prepare<const D: usize>(
     run: &RunConfig,
     mut images: MeshImages<D>,
-    dimension: &'m Dimension<D>,
+    dimension: &Dimension<D>,
     session: &mut Session<'_>,
-) -> Result<(Prepared<'m, D>, Image<D>), JobError> {
+) -> Result<(Prepared<D>, Image<D>), JobError> {
     let mut options = run.mesh_options::<D>()?;
     options.memory_limit = memory::available();
     let potential = images.take_potential(run)?;
