@@ -192,7 +192,7 @@ fn along<const D: usize>(
         let enhanced = enhanced.map_err(|e| JobError::from(e).about_content(path))?;
         (*image.frame(), enhanced.values)
     };
-    let potential = ScalarField::new(frame.grid(units), samples, options.interpolation);
+    let potential = ScalarField::potential(frame.grid(units), samples, options.interpolation);
     let potential = potential.map_err(|e| JobError::content(e).about(path))?;
     let mesh = lattice_mesh(&loaded.mesh, &frame, units);
     Ok(FacetField::along(&mesh, &potential, session)?)

@@ -24,7 +24,7 @@ pub fn refusal(run: &RunConfig, error: RunError) -> JobError {
             outside(run, *index).about_any(shown)
         }
         RunError::Enhance(EnhanceError::OutOfRange { .. })
-        | RunError::Potential(FieldError::OutOfRange { .. }) => {
+        | RunError::Potential(FieldError::Potential { .. }) => {
             JobError::content(error).about_any(input.potential.as_deref().or(shown))
         }
         RunError::Potential(FieldError::Weight { index: Some(_), .. }) => {

@@ -20,7 +20,6 @@ pub use poly_mesh::{
 };
 pub use quadratic::Quadratic;
 use rayon::prelude::*;
-pub(crate) use tags::sides_of;
 pub use tags::{
     FacetGroup, MASK_NAME, Regions, Tags, TagsError, feature_name, interface_name, is_feature_name,
     region_name, side_name,

@@ -56,7 +56,8 @@ pub(super) fn finish<const D: usize>(
     watch: &mut dyn Watch,
 ) -> Result<Outcome<D>, RunError> {
     let Improved { run, mesh, report, mirror_report, improve_report } = improved;
-    let Parts { potential, distance, outline, labels, .. } = run.parts();
+    let Parts { outline, labels, .. } = run.parts();
+    let (potential, distance) = (run.potential(), run.distance());
     let outline_facets = match outline {
         Some(_) => outline_facets(&mesh, &run.bounds()),
         None => Vec::new(),

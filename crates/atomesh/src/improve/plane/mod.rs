@@ -13,9 +13,9 @@
 //!
 //! Rounds, each of swaps ([`swaps`]) and then moves ([`moves`]), lower E until nothing helps. In the first
 //! rounds shape weighs more: cells below the floor are raised before features hold them. In some rounds points
-//! are taken away where they crowd and added where they are missing ([`crowds`]).
+//! are taken away where they crowd and added where they are missing ([`density`]).
 
-mod crowds;
+mod density;
 mod energy;
 mod guides;
 mod moves;
@@ -26,7 +26,7 @@ mod tests;
 mod triangles;
 
 use super::{Align, ImproveError, ImproveOptions, ImproveReport, Improver};
-use crate::fields::Fields;
+use crate::fields::FieldsView;
 use crate::mesh::Mesh;
 use crate::watch::{Phase, Watch, check};
 
@@ -52,7 +52,7 @@ impl Improver<2> for PlaneImprover {
         &self,
         mesh: Mesh<2>,
         freedom: &[u8],
-        fields: Fields<'_, 2>,
+        fields: FieldsView<'_, 2>,
         options: &ImproveOptions,
         watch: &mut dyn Watch,
     ) -> Result<(Mesh<2>, ImproveReport), ImproveError> {
@@ -76,9 +76,9 @@ impl Improver<2> for PlaneImprover {
             energy.shape_weight = if round < EARLY.0 { EARLY.1 } else { 1.0 };
             let swaps = swaps::swap_all(&mut triangles, &energy, &mut mover);
             if is_full && CROWDS.contains(&round) {
-                report.removed += crowds::thin_out(&mut triangles, &energy, &mut mover);
+                report.removed += density::thin_out(&mut triangles, &energy, &mut mover);
                 let distance = fields.distance;
-                report.added += crowds::fill_up(&mut triangles, &energy, &mut mover, distance);
+                report.added += density::fill_up(&mut triangles, &energy, &mut mover, distance);
             }
             let moves = if is_full { mover.move_all(&mut triangles, &energy) } else { 0 };
             report.rounds += 1;

@@ -8,7 +8,7 @@ use super::PlaneImprover;
 use super::energy::{Edge, Energy, Shape, least_sine};
 use super::guides::{Guide, guides};
 use super::triangles::Triangles;
-use crate::fields::Fields;
+use crate::fields::FieldsView;
 use crate::fields::NominalDistance;
 use crate::fields::{ImageWeight, Interpolation, ScalarField};
 use crate::geometry::{Bounds, Point, difference, dot};
@@ -56,7 +56,7 @@ impl Scene {
             let p = [(i % columns) as f64 * grid.step[0], (i / columns) as f64 * grid.step[1]];
             (-depth * (-0.5 * (line.off(&p) / 1.5).powi(2)).exp()) as f32
         });
-        let potential = ScalarField::new(grid, samples.collect(), Interpolation::Spline);
+        let potential = ScalarField::potential(grid, samples.collect(), Interpolation::Spline);
         Self {
             potential: potential.unwrap(),
             weight: ImageWeight::constant(0.45).unwrap(),
@@ -65,8 +65,8 @@ impl Scene {
         }
     }
 
-    fn fields(&self) -> Fields<'_, 2> {
-        Fields { potential: &self.potential, weight: &self.weight, distance: &self.distance }
+    fn fields(&self) -> FieldsView<'_, 2> {
+        FieldsView { potential: &self.potential, weight: &self.weight, distance: &self.distance }
     }
 
     fn bounds(&self) -> Bounds<2> {

@@ -1,9 +1,9 @@
-//! The cells around an edge, and how to fill their place without the edge.
+//! The cells around an edge, and how to fill their space without the edge.
 
-use super::patch::{NONE, Patch};
+use super::tetrahedra::{NONE, Tetrahedra};
 
-/// The most points around an edge that is looked at. Of Delaunay's mesh of a lattice most have four to six; more
-/// than seven pay seldom (Freitag & Ollivier-Gooch 1997) and their triangulations are many.
+/// The most points around an edge that may be swapped. In Delaunay meshes of lattices, most edges have four to six;
+/// swaps of more than seven seldom gain anything (Freitag & Ollivier-Gooch 1997) and have many triangulations.
 pub(super) const MOST: usize = 8;
 
 /// For corners i and j of a cell, the other two in the order that makes all four positive.
@@ -16,7 +16,7 @@ const OTHERS: [[[u8; 2]; 4]; 4] = [
 
 /// The cells around an edge and the points between them, counter-clockwise seen from the edge's end.
 #[derive(Clone, Copy, Debug)]
-pub(super) struct Ring {
+pub(super) struct EdgeRing {
     /// The edge.
     pub ends: [u32; 2],
     pub points: [u32; MOST],
@@ -27,7 +27,7 @@ pub(super) struct Ring {
     pub cell_count: usize,
 }
 
-impl Ring {
+impl EdgeRing {
     /// The cells.
     pub fn cells(&self) -> &[u32] {
         &self.cells[..self.cell_count]
@@ -35,16 +35,16 @@ impl Ring {
 
     /// The ring around the edge of corners `i` and `j` of a cell; `None` if it has more than [`MOST`] points, or
     /// ends at facets that must stay.
-    pub fn around(patch: &Patch, cell: u32, i: usize, j: usize) -> Option<Self> {
-        let (a, b) = (patch.corners[cell as usize][i], patch.corners[cell as usize][j]);
+    pub fn around(tetrahedra: &Tetrahedra, cell: u32, i: usize, j: usize) -> Option<Self> {
+        let (a, b) = (tetrahedra.corners[cell as usize][i], tetrahedra.corners[cell as usize][j]);
         let others = |cell: u32| {
-            let [x, y] = OTHERS[patch.place(cell, a)][patch.place(cell, b)];
+            let [x, y] = OTHERS[tetrahedra.place(cell, a)][tetrahedra.place(cell, b)];
             (usize::from(x), usize::from(y))
         };
         // back to where the ring begins at the hull, or once around
         let (mut start, mut closed, mut length) = (cell, false, 1);
         loop {
-            let back = patch.neighbours[start as usize][others(start).1];
+            let back = tetrahedra.neighbours[start as usize][others(start).1];
             if back == NONE {
                 break;
             }
@@ -64,18 +64,18 @@ impl Ring {
         for n in 0..length {
             let (x, y) = others(at);
             ring.cells[n] = at;
-            ring.points[n] = patch.corners[at as usize][x];
+            ring.points[n] = tetrahedra.corners[at as usize][x];
             if n + 1 == length && !closed {
                 if length == MOST {
                     return None;
                 }
-                ring.points[length] = patch.corners[at as usize][y];
+                ring.points[length] = tetrahedra.corners[at as usize][y];
             }
-            at = patch.neighbours[at as usize][x];
+            at = tetrahedra.neighbours[at as usize][x];
         }
         ring.count = length + usize::from(!closed);
         let last = ring.points[ring.count - 1];
-        let side = [a, b, ring.points[0], last].map(|p| patch.sides[p as usize]);
+        let side = [a, b, ring.points[0], last].map(|p| tetrahedra.sides[p as usize]);
         let is_free = closed || side.iter().fold(63, |all, s| all & s) != 0;
         (is_free && ring.count >= 3).then_some(ring)
     }
@@ -88,10 +88,10 @@ impl Ring {
         [[x, y, z, b], [x, z, y, a]]
     }
 
-    /// The best way to fill the ring with triangles: `worth` of a triangle, and of a chord (an edge between points
-    /// that are no neighbours), joined by `join` (a sum or the lesser), is to be greatest. Parts that are worth
-    /// `least` or less are not taken, and the answer is more than `least`. By dynamic programming over the
-    /// polygon (Klincsek 1980; for this use Shewchuk 2002). Cost: O(n³).
+    /// The way to fill the ring with triangles that is worth most. `worth(ring, i, k, j)` is that of triangle i k j
+    /// with its chord i j; `join`, a sum or the lesser with its `neutral` number, makes one worth of several. The
+    /// answer, and every part of it, is worth more than `least`. By dynamic programming over the polygon (Klincsek
+    /// 1980; for this use Shewchuk 2002). Cost: O(n³).
     pub fn fill(
         &self,
         least: f64,

@@ -1,18 +1,18 @@
-//! A part of a mesh with the cells' neighbours at hand, that can be changed locally.
+//! Tetrahedra of a part of a mesh that can be swapped and moved: who is beside whom, and their shapes.
 //!
 //! Cells lie in slots; a slot that a change leaves over is dead until another change fills it. Facet k of a cell is
-//! opposite its corner k. What lies beyond the patch, be it the box or the rest of the mesh, is [`NONE`]: facets
+//! opposite its corner k. What lies beyond the part, be it the outside or the rest of the mesh, is [`NONE`]: facets
 //! there stay, unless they lie on a side of the box.
 
 use super::shape::{Shape, shape};
-use crate::geometry::{Bounds, Point};
+use crate::geometry::Point;
 
 /// No cell, no point.
 pub(super) const NONE: u32 = u32::MAX;
 
 /// Cells, their neighbours and their shapes.
 #[derive(Clone)]
-pub(super) struct Patch {
+pub(super) struct Tetrahedra {
     pub points: Vec<Point<3>>,
     /// Bit k of a point: it may move along axis k.
     pub freedom: Vec<u8>,
@@ -29,15 +29,17 @@ pub(super) struct Patch {
     seen: Vec<u32>,
     search: u32,
     /// Room for the facets around a change.
-    facets: Vec<([u32; 3], u32, u32)>,
+    facets: Vec<Facet>,
 }
 
-/// The sides of the box that a point lies on, as bits.
-pub(super) fn sides_of(p: &Point<3>, bounds: &Bounds<3>) -> u8 {
-    (0..3).fold(0, |bits, k| {
-        let low = u8::from(p[k] <= bounds.min[k]) << k;
-        bits | low | u8::from(p[k] >= bounds.max[k]) << (3 + k)
-    })
+/// A facet of a cell.
+#[derive(Clone, Copy)]
+struct Facet {
+    /// Its corners, ascending.
+    key: [u32; 3],
+    cell: u32,
+    /// The corner opposite it.
+    place: u32,
 }
 
 /// Three corners, ascending.
@@ -53,8 +55,8 @@ fn facet_key(cell: &[u32; 4], k: usize) -> [u32; 3] {
     sorted(cell[(k + 1) & 3], cell[(k + 2) & 3], cell[(k + 3) & 3])
 }
 
-impl Patch {
-    /// A patch of these cells.
+impl Tetrahedra {
+    /// These cells; see [`Self::freedom`] and [`Self::sides`].
     pub fn new(
         points: Vec<Point<3>>,
         freedom: Vec<u8>,
@@ -66,7 +68,7 @@ impl Patch {
         for (cell, corners) in corners.iter().enumerate() {
             corners.iter().for_each(|&c| cell_of[c as usize] = cell as u32);
         }
-        let mut patch = Self {
+        let mut tetrahedra = Self {
             seen: vec![0; corners.len()],
             shapes: Vec::with_capacity(corners.len()),
             points,
@@ -79,12 +81,12 @@ impl Patch {
             search: 0,
             facets: Vec::new(),
         };
-        patch.hold_rim();
-        for cell in 0..patch.corners.len() {
-            let shape = patch.shape_of(&patch.corners[cell]);
-            patch.shapes.push(shape);
+        tetrahedra.hold_rim();
+        for cell in 0..tetrahedra.corners.len() {
+            let shape = tetrahedra.shape_of(&tetrahedra.corners[cell]);
+            tetrahedra.shapes.push(shape);
         }
-        patch
+        tetrahedra
     }
 
     /// Holds the corners of facets with nothing beyond, unless the facet lies on a side of the box: points slide there.
@@ -149,7 +151,7 @@ impl Patch {
         }
     }
 
-    /// The place of a cell's corner in the facet-neighbour beyond facet k, opposite the facet.
+    /// Which corner of the cell beyond facet k is opposite the facet.
     #[inline(always)]
     pub fn back(&self, cell: u32, k: usize) -> usize {
         let beyond = self.neighbours[cell as usize][k];
@@ -169,19 +171,19 @@ impl Patch {
         star.into_iter().find(|&cell| has(&self.corners[cell as usize]))
     }
 
-    /// Calls `visit` once for every edge of an open point, with a cell that has it.
-    pub fn each_edge(&mut self, open: &[bool], mut visit: impl FnMut(&Self, u32, u32, u32)) {
+    /// Calls `visit` once for every edge of an active point, with a cell that has it.
+    pub fn each_edge(&mut self, active: &[bool], mut visit: impl FnMut(&Self, u32, u32, u32)) {
         let mut last = vec![NONE; self.points.len()];
         let mut star = Vec::with_capacity(40);
         for point in 0..self.points.len() as u32 {
-            if !open[point as usize] {
+            if !active[point as usize] {
                 continue;
             }
             star.clear();
             self.star(point, &mut star);
             for &cell in &star {
                 for other in self.corners[cell as usize] {
-                    let is_first = other > point || !open[other as usize];
+                    let is_first = other > point || !active[other as usize];
                     if is_first && other != point && last[other as usize] != point {
                         last[other as usize] = point;
                         visit(self, cell, point, other);
@@ -191,7 +193,7 @@ impl Patch {
         }
     }
 
-    /// Puts cells with the given corners in the place of others that fill the same space.
+    /// Puts cells with the given corners in the place of others. Both must fill the same space.
     pub fn replace(&mut self, old: &[u32], new: &[[u32; 4]]) {
         let mut facets = std::mem::take(&mut self.facets);
         facets.clear();
@@ -201,7 +203,7 @@ impl Patch {
                 if beyond != NONE && !old.contains(&beyond) {
                     let key = facet_key(&self.corners[cell as usize], k);
                     let back = (0..4).find(|&k| self.neighbours[beyond as usize][k] == cell);
-                    facets.push((key, beyond, back.unwrap_or(0) as u32));
+                    facets.push(Facet { key, cell: beyond, place: back.unwrap_or(0) as u32 });
                 }
             }
             self.corners[cell as usize] = [NONE; 4];
@@ -213,15 +215,16 @@ impl Patch {
             self.neighbours[cell as usize] = [NONE; 4];
             self.shapes[cell as usize] = self.shape_of(corners);
             for k in 0..4 {
-                facets.push((facet_key(corners, k), cell, k as u32));
+                facets.push(Facet { key: facet_key(corners, k), cell, place: k as u32 });
                 self.cell_of[corners[k] as usize] = cell;
             }
         }
-        facets.sort_unstable_by_key(|f| f.0);
+        facets.sort_unstable_by_key(|facet| facet.key);
         for pair in facets.windows(2) {
-            if pair[0].0 == pair[1].0 {
-                self.neighbours[pair[0].1 as usize][pair[0].2 as usize] = pair[1].1;
-                self.neighbours[pair[1].1 as usize][pair[1].2 as usize] = pair[0].1;
+            let (a, b) = (&pair[0], &pair[1]);
+            if a.key == b.key {
+                self.neighbours[a.cell as usize][a.place as usize] = b.cell;
+                self.neighbours[b.cell as usize][b.place as usize] = a.cell;
             }
         }
         self.facets = facets;
