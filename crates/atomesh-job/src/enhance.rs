@@ -129,7 +129,8 @@ fn run<const D: usize>(
         session.begin(Phase::Draw);
         let nothing = Mesh::new(Vec::new(), Vec::new()).map_err(JobError::content)?;
         let style = Style { units, brightness: 1.0, edge_pixels: 4.0, ..Style::default() };
-        let drawn = (dimension.draw)(&potential, &nothing, &style).map_err(JobError::content)?;
+        let drawn =
+            (dimension.drawing.mesh)(&potential, &nothing, &style).map_err(JobError::content)?;
         session.writing(|_| file.write(&drawn))?;
     }
     check(session, Phase::Write, 0.0, None).map_err(|_| JobError::cancelled())?;

@@ -2,8 +2,7 @@
 
 use std::path::{Path, PathBuf};
 
-use atomesh_flow::two_point::transmissibilities;
-use atomesh_flow::{FlowError, Grid, Problem, Setting};
+use atomesh_flow::{FlowError, FlowMethod, Problem};
 use atomesh_io::mesh::cells::{
     AnyCells, CellData, CellReadError, ConnectionFiles, Flow, LoadedCells, ModflowFiles, Rock,
     read_cells, write_connections_with_flow, write_modflow,
@@ -119,8 +118,12 @@ pub fn export_file(
             let message = "holds polyhedra; expected a file to write that ends in .disu";
             Err(JobError::misuse(message).about(&request.cells))
         }
-        (AnyCells::Flat(cells), _) => export(request, &format, &cells, session),
-        (AnyCells::Volume(cells), _) => export(request, &format, &cells, session),
+        (AnyCells::Flat(cells), _) => {
+            Export { request, format: &format, cells: &cells }.write(&FlowMethod::plane(), session)
+        }
+        (AnyCells::Volume(cells), _) => {
+            Export { request, format: &format, cells: &cells }.write(&FlowMethod::space(), session)
+        }
     }
 }
 
@@ -136,47 +139,56 @@ fn refusal(error: CellReadError, path: &Path) -> JobError {
     .about(path)
 }
 
-fn export<const D: usize>(
-    request: &ExportRequest,
-    format: &ExportFormat,
-    cells: &LoadedCells<D>,
-    session: &mut Session<'_>,
-) -> Result<ExportSummary, JobError> {
-    let grid = Grid::of_cells(&cells.mesh, Some(&cells.features));
-    let barriers = request.barrier.iter().map(|spec| spec.barrier().clone()).collect();
-    let permeability = permeability::given(&request.permeability, &cells.fields)?;
-    let problem = Problem { permeability, barriers, ..Problem::default() };
-    let about = |e: FlowError| flow_refusal(e, &request.cells);
-    let setting = Setting::new(&problem, &grid).map_err(about)?;
-    let multipliers = setting.multipliers();
-    let found =
-        transmissibilities(&cells.mesh, setting.permeability(), multipliers).map_err(about)?;
-    let k: Vec<f64> = (0..cells.mesh.cell_count())
-        .map(|cell| problem.permeability.scalar(cell).expect("it is no tensor"))
-        .collect();
-    let (frame, provenance) = (&cells.frame, &cells.provenance);
-    let data = CellData { mesh: &cells.mesh, features: &cells.features, frame, provenance };
-    let written = session.writing(|session| match format {
-        ExportFormat::Connections(files) => {
-            let flow = Flow { permeability: &k, transmissibilities: &found };
-            write_connections_with_flow(files, &data, flow, session)
-        }
-        ExportFormat::Disv(files) | ExportFormat::Disu(files) => {
-            let (top, thickness) = (request.top, request.thickness);
-            let rock = Rock { permeability: &k, multipliers, top, thickness };
-            write_modflow(files, &data, &rock, session)
-        }
-    });
-    written.map_err(|e| JobError::from(e).about(&request.output))?;
-    let open = found.iter().copied().filter(|t| *t > 0.0);
-    let (least, greatest) = open.fold((f64::INFINITY, 0.0_f64), |(l, m), t| (l.min(t), m.max(t)));
-    Ok(ExportSummary {
-        cell_count: cells.mesh.cell_count(),
-        connections: cells.mesh.inner_face_count(),
-        sealed: multipliers.iter().filter(|multiplier| **multiplier == 0.0).count(),
-        least,
-        greatest,
-    })
+/// Cells that are exported.
+struct Export<'a, const D: usize> {
+    request: &'a ExportRequest,
+    format: &'a ExportFormat,
+    cells: &'a LoadedCells<D>,
+}
+
+impl<const D: usize> Export<'_, D> {
+    fn write(
+        &self,
+        method: &FlowMethod<D>,
+        session: &mut Session<'_>,
+    ) -> Result<ExportSummary, JobError> {
+        let LoadedCells { mesh, features, fields, frame, provenance } = self.cells;
+        let grid = (method.grid_of_cells)(mesh, Some(features));
+        let barriers = self.request.barrier.iter().map(|spec| spec.barrier().clone()).collect();
+        let permeability = permeability::given(&self.request.permeability, fields)?;
+        let problem = Problem { permeability, barriers, ..Problem::default() };
+        let about = |e: FlowError| flow_refusal(e, &self.request.cells);
+        let setting = (method.setting)(&problem, &grid).map_err(about)?;
+        let multipliers = setting.multipliers();
+        let found = (method.transmissibilities)(mesh, setting.permeability(), multipliers);
+        let found = found.map_err(about)?;
+        let k: Vec<f64> = (0..mesh.cell_count())
+            .map(|cell| problem.permeability.scalar(cell).expect("it is no tensor"))
+            .collect();
+        let data = CellData { mesh, features, frame, provenance };
+        let written = session.writing(|session| match self.format {
+            ExportFormat::Connections(files) => {
+                let flow = Flow { permeability: &k, transmissibilities: &found };
+                write_connections_with_flow(files, &data, flow, session)
+            }
+            ExportFormat::Disv(files) | ExportFormat::Disu(files) => {
+                let (top, thickness) = (self.request.top, self.request.thickness);
+                let rock = Rock { permeability: &k, multipliers, top, thickness };
+                write_modflow(files, &data, &rock, session)
+            }
+        });
+        written.map_err(|e| JobError::from(e).about(&self.request.output))?;
+        let open = found.iter().copied().filter(|t| *t > 0.0);
+        let (least, greatest) =
+            open.fold((f64::INFINITY, 0.0_f64), |(l, m), t| (l.min(t), m.max(t)));
+        Ok(ExportSummary {
+            cell_count: mesh.cell_count(),
+            connections: mesh.inner_face_count(),
+            sealed: multipliers.iter().filter(|multiplier| **multiplier == 0.0).count(),
+            least,
+            greatest,
+        })
+    }
 }
 
 fn flow_refusal(error: FlowError, cells: &Path) -> JobError {

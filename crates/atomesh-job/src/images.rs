@@ -65,7 +65,7 @@ pub fn read(
 
 /// What an image that is read for a mesh is to the mesh.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum Role {
+pub enum ImageRole {
     /// What the mesh follows: it lies where the mesh's image did, and NaN samples are an error.
     Followed,
     /// A property that its cells get: a frame of its own counts, and NaN samples are none.
@@ -80,7 +80,7 @@ pub struct Beside<'a, const D: usize> {
     /// The options of the frame, which go before all.
     pub options: &'a FrameOptions,
     /// What the image is to the mesh.
-    pub role: Role,
+    pub role: ImageRole,
 }
 
 impl<const D: usize> Beside<'_, D> {
@@ -105,13 +105,13 @@ impl<const D: usize> Beside<'_, D> {
     }
 
     fn place(&self, image: Image<D>, has_frame: bool) -> Result<Image<D>, JobError> {
-        let keeps_own = has_frame && self.role == Role::Property;
+        let keeps_own = has_frame && self.role == ImageRole::Property;
         let known = self.frame.filter(|f| !keeps_own && f.shape() == image.frame().shape());
         let frame = *known.unwrap_or(image.frame());
         let image = image.with_frame(frame).map_err(JobError::content)?;
         match self.role {
-            Role::Followed => self.options.place(image),
-            Role::Property => self.options.place_as_is(image),
+            ImageRole::Followed => self.options.place(image),
+            ImageRole::Property => self.options.place_as_is(image),
         }
     }
 }

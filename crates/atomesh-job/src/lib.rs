@@ -40,9 +40,10 @@
 //! let mut watch = Silent;
 //! let mut session = Session::new(&mut watch);
 //! let images = MeshImages::new(image);
-//! let answer = flow(&run, &options, images, &Dimension::plane(), &mut session)?;
+//! let plane = Dimension::plane();
+//! let answer = flow(&run, &options, images, &plane, &mut session)?;
 //!
-//! let balance = answer.solution.balance(&answer.grid);
+//! let balance = answer.balance(&plane.flow);
 //! assert!((balance.wells_in - 2.0).abs() < 1e-9 && balance.relative_error() < 1e-9);
 //! # Ok::<(), Box<dyn std::error::Error>>(())
 //! ```

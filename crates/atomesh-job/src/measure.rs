@@ -13,7 +13,7 @@ use atomesh_io::mesh::{AnyMesh, LoadedMesh};
 use crate::dimension::Dimension;
 use crate::error::JobError;
 use crate::files::{self, write_bytes};
-use crate::images::{Beside, Role, is_z_up};
+use crate::images::{Beside, ImageRole, is_z_up};
 use crate::mesh_file;
 use crate::options::FrameOptions;
 use crate::page::{PageParts, Shown, caption, option_rows, write_page};
@@ -151,7 +151,7 @@ fn run<const D: usize>(
     session: &mut Session<'_>,
 ) -> Result<MeshReport, JobError> {
     let (frame, options) = (loaded.frame.as_ref(), &request.frame);
-    let beside = Beside { frame, options, role: Role::Followed };
+    let beside = Beside { frame, options, role: ImageRole::Followed };
     let mut read = |path: &Path| beside.read(path, dimension, session);
     let potential = read(&request.potential)?;
     let image = request.image.as_deref().map(&mut read).transpose()?;

@@ -47,7 +47,7 @@ pub(crate) fn write_page<const D: usize>(
     shown: &Shown<'_, D>,
     dimension: &Dimension<D>,
 ) -> Result<(), JobError> {
-    let picture = (dimension.draw)(shown.image, shown.mesh, shown.style);
+    let picture = (dimension.drawing.mesh)(shown.image, shown.mesh, shown.style);
     let name = parts.mesh.file_name().unwrap_or(parts.mesh.as_os_str());
     let page = ReportPage {
         title: name.to_string_lossy().into_owned(),

@@ -10,7 +10,7 @@ use atomesh_io::mesh::{AnyMesh, LoadedMesh, MeshData, MeshFormat, Values, write_
 use crate::dimension::Dimension;
 use crate::error::JobError;
 use crate::files::{self, unknown_extension};
-use crate::images::{Beside, Role};
+use crate::images::{Beside, ImageRole};
 use crate::mesh_file;
 use crate::options::FrameOptions;
 use crate::session::Session;
@@ -205,7 +205,7 @@ fn run<const D: usize>(
     let mut found = Vec::new();
     for named in &request.image {
         let (frame, options) = (loaded.frame.as_ref(), &request.frame);
-        let beside = Beside { frame, options, role: Role::Property };
+        let beside = Beside { frame, options, role: ImageRole::Property };
         let image = beside.read(&named.path, dimension, session)?;
         found.extend(sample(request, named, &loaded, &image, session)?);
     }

@@ -63,7 +63,7 @@ fn an_image_in_memory_becomes_a_mesh_and_an_answer_in_one_call() {
     assert_eq!(mesh.validate(), Ok(()));
     assert!(tags.facet_group("feature-1").is_some(), "the row is a barrier");
     // two units flow from one side of the row to the other, and the pressure falls across it
-    let balance = answer.solution.balance(&answer.grid);
+    let balance = answer.balance(&plane.flow);
     assert!((balance.wells_in - 2.0).abs() < 1e-9 && (balance.wells_out - 2.0).abs() < 1e-9);
     assert!(balance.relative_error() < 1e-9);
     let [source, sink] = [0, 1].map(|well: usize| answer.solution.wells[well].cell_pressure);

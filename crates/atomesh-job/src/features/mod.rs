@@ -15,7 +15,7 @@ use atomesh_io::mesh::{AnyMesh, LoadedMesh};
 
 use crate::dimension::Dimension;
 use crate::error::JobError;
-use crate::images::{Beside, Role};
+use crate::images::{Beside, ImageRole};
 use crate::mesh_file;
 use crate::options::{FrameOptions, PotentialOptions, RunConfig};
 use crate::session::Session;
@@ -222,7 +222,7 @@ fn run<const D: usize>(
 ) -> Result<FeaturesSummary, JobError> {
     files.check_dimension(D)?;
     let (frame, options) = (loaded.frame.as_ref(), &request.frame);
-    let beside = Beside { frame, options, role: Role::Followed };
+    let beside = Beside { frame, options, role: ImageRole::Followed };
     let image = match request.source() {
         Some(path) => Some(beside.read(path, dimension, session)?),
         None => None,

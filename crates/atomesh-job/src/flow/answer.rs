@@ -1,7 +1,7 @@
 //! What flows, and how it was found.
 
 use atomesh_flow::dg::DgSolution;
-use atomesh_flow::{Grid, Problem, Setting, Solution};
+use atomesh_flow::{Balance, FlowGrid, FlowMethod, Problem, Setting, Solution};
 use serde_json::{Value, json};
 
 use super::flow_mesh::FlowMesh;
@@ -13,7 +13,7 @@ pub struct FlowAnswer<const D: usize> {
     /// What it was computed on.
     pub mesh: FlowMesh<D>,
     /// Cells and facets.
-    pub grid: Grid<D>,
+    pub grid: FlowGrid<D>,
     /// What was asked.
     pub problem: Problem<'static, D>,
     /// Pressures and fluxes.
@@ -28,8 +28,8 @@ pub struct FlowAnswer<const D: usize> {
 
 impl<const D: usize> FlowAnswer<D> {
     /// The problem placed on the grid, as streamlines need it. Cost: O(cells).
-    pub fn setting(&self) -> Setting<'_, D> {
-        Setting::new(&self.problem, &self.grid).expect("it was solved")
+    pub fn setting(&self, method: &FlowMethod<D>) -> Setting<'_, D> {
+        (method.setting)(&self.problem, &self.grid).expect("it was solved")
     }
 
     /// What was solved, as in `discontinuous Galerkin of order 2`.
@@ -45,9 +45,19 @@ impl<const D: usize> FlowAnswer<D> {
         (0..self.grid.cell_count()).map(|cell| self.problem.permeability.scalar(cell)).collect()
     }
 
+    /// What flows in and out.
+    pub fn balance(&self, method: &FlowMethod<D>) -> Balance {
+        (method.balance)(&self.solution, &self.grid)
+    }
+
     /// Everything in numbers.
-    pub(super) fn report(&self, setting: &Setting<'_, D>, session: &Session<'_>) -> Value {
-        let balance = self.solution.balance(&self.grid);
+    pub(super) fn report(
+        &self,
+        setting: &Setting<'_, D>,
+        method: &FlowMethod<D>,
+        session: &Session<'_>,
+    ) -> Value {
+        let balance = self.balance(method);
         let compartments: Vec<_> = (setting.compartments().iter().enumerate())
             .map(|(number, own)| {
                 json!({

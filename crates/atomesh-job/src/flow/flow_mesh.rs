@@ -6,7 +6,7 @@ use atomesh::features::{FeatureFaces, FeatureFacetOptions};
 use atomesh::image::{Frame, Image, Units};
 use atomesh::mesh::{Mesh, PolyMesh, Tags};
 use atomesh::run::{Outcome, Prepared};
-use atomesh_flow::Grid;
+use atomesh_flow::{FlowGrid, FlowMethod};
 use atomesh_io::mesh::cells::{AnyCells, CellReadError, LoadedCells, read_cells};
 use atomesh_io::mesh::{AnyMesh, LoadedMesh, OwnedField, Provenance};
 
@@ -169,10 +169,12 @@ impl<const D: usize> FlowMesh<D> {
     }
 
     /// Cells and facets, as the schemes take them.
-    pub fn grid(&self) -> Grid<D> {
+    pub fn grid(&self, method: &FlowMethod<D>) -> FlowGrid<D> {
         match &self.cells {
-            FlowMeshCells::Voronoi { cells, features } => Grid::of_cells(cells, Some(features)),
-            FlowMeshCells::Simplices { mesh, tags } => Grid::of_mesh(mesh, tags),
+            FlowMeshCells::Voronoi { cells, features } => {
+                (method.grid_of_cells)(cells, Some(features))
+            }
+            FlowMeshCells::Simplices { mesh, tags } => (method.grid_of_mesh)(mesh, tags),
         }
     }
 }

@@ -20,7 +20,7 @@ use std::path::PathBuf;
 
 use atomesh::image::Image;
 use atomesh_flow::dg::{self, Form};
-use atomesh_flow::{Balance, Setting, WellFlow, two_point};
+use atomesh_flow::{Balance, WellFlow};
 use atomesh_io::image::{AnyImage, ImageFormat};
 use atomesh_io::mesh::MeshFormat;
 
@@ -79,14 +79,15 @@ pub fn flow_on<const D: usize>(
     dimension: &Dimension<D>,
     session: &mut Session<'_>,
 ) -> Result<FlowAnswer<D>, JobError> {
-    let grid = mesh.grid();
+    let method = &dimension.flow;
+    let grid = mesh.grid(method);
     let permeability = permeability::permeability(options, frame, &mesh, dimension, session)?;
     let problem = problem::problem(options, &grid, permeability)?;
-    let setting = Setting::new(&problem, &grid)?;
+    let setting = (method.setting)(&problem, &grid)?;
     let (solution, galerkin) = match &mesh.cells {
         FlowMeshCells::Voronoi { cells, .. } => {
             options.check_for_voronoi()?;
-            (two_point::solve(cells, &grid, &setting, &options.solve(), session)?, None)
+            ((method.solve_two_point)(cells, &grid, &setting, &options.solve(), session)?, None)
         }
         FlowMeshCells::Simplices { .. } => {
             let galerkin = options.galerkin();
@@ -96,15 +97,15 @@ pub fn flow_on<const D: usize>(
                 let text = "obb takes long on so many tetrahedra; sipg is much faster";
                 session.warn(None, text);
             }
-            let answer = dg::solve(&grid, &setting, &galerkin, session)?;
+            let answer = (method.solve_dg)(&grid, &setting, &galerkin, session)?;
             (answer.solution.clone(), Some(answer))
         }
     };
-    if solution.balance(&grid).scale == 0.0 {
+    if (method.balance)(&solution, &grid).scale == 0.0 {
         let text = "nothing flows: barriers part all that drives it, or it is the same everywhere";
         session.warn(None, text);
     }
-    let velocities = solution.velocities(&grid);
+    let velocities = (method.velocities)(&solution, &grid);
     let porosity = options.porosity;
     Ok(FlowAnswer { mesh, grid, problem, solution, velocities, galerkin, porosity })
 }
@@ -266,7 +267,7 @@ impl FileRun<'_> {
             self.files.check_for_voronoi()?;
         }
         let answer = flow_on(mesh, self.options, &self.run.frame, dimension, session)?;
-        FlowWriting::new(self.files, &answer).write(dimension, session)?;
+        FlowWriting::new(self.files, &answer, dimension).write(session)?;
         let solve = &answer.solution.solve;
         Ok(FlowSummary {
             cell_count: answer.grid.cell_count(),
@@ -274,7 +275,7 @@ impl FileRun<'_> {
             unknowns: solve.unknowns,
             method: solve.method.to_string(),
             wells: answer.solution.wells.clone(),
-            balance: answer.solution.balance(&answer.grid),
+            balance: answer.balance(&dimension.flow),
         })
     }
 }

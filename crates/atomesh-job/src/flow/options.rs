@@ -3,7 +3,7 @@
 use std::path::PathBuf;
 
 use atomesh_flow::dg::{DgOptions, Form};
-use atomesh_flow::solve::{Method, SolveOptions};
+use atomesh_flow::solve::{SolveMethod, SolveOptions};
 
 use crate::error::JobError;
 use crate::memory;
@@ -68,8 +68,8 @@ pub struct FlowOptions {
     pub order: Option<u8>,
     /// How the equations are solved
     #[cfg_attr(feature = "clap", arg(long, value_name = "METHOD", default_value = "auto",
-        value_parser = named::<Method>(&["auto", "direct", "iterative"])))]
-    pub solver: Method,
+        value_parser = named::<SolveMethod>(&["auto", "direct", "iterative"])))]
+    pub solver: SolveMethod,
     /// Residual that iteration may leave, relative to the right-hand side, 1e-15 to 0.01
     #[cfg_attr(feature = "clap", arg(long, value_name = "SHARE", default_value_t = Self::default().solver_tolerance,
         value_parser = number_in(1e-15, 1e-2, "a number from 1e-15 to 0.01")))]
@@ -91,7 +91,7 @@ impl Default for FlowOptions {
             porosity: 1.0,
             form: None,
             order: None,
-            solver: Method::Auto,
+            solver: SolveMethod::Auto,
             solver_tolerance: SolveOptions::default().tolerance,
         }
     }

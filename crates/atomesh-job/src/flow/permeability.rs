@@ -10,7 +10,7 @@ use super::flow_mesh::{FlowMesh, FlowMeshCells};
 use super::options::FlowOptions;
 use crate::dimension::Dimension;
 use crate::error::JobError;
-use crate::images::{Beside, Role};
+use crate::images::{Beside, ImageRole};
 use crate::options::FrameOptions;
 use crate::permeability::given;
 use crate::session::Session;
@@ -29,7 +29,7 @@ pub(super) fn permeability<const D: usize>(
     let Some(path) = &options.permeability_image else {
         return given(&options.permeability, &mesh.cell_fields);
     };
-    let beside = Beside { frame: mesh.frame.as_ref(), options: frame, role: Role::Property };
+    let beside = Beside { frame: mesh.frame.as_ref(), options: frame, role: ImageRole::Property };
     let image = beside.read(path, dimension, session)?;
     let statistic = options.permeability_mean.parse().map_err(JobError::misuse)?;
     let means = match &mesh.cells {

@@ -57,7 +57,7 @@ impl<const D: usize> FlowDrawing<'_, D> {
             ..FlowPicture::new(shape.cells())
         };
         let style = Style { units: mesh.units, z_up: mesh.z_up, ..Style::default() };
-        (dimension.draw_flow)(&picture, &style, &FlowStyle::default()).map_err(JobError::content)
+        (dimension.drawing.flow)(&picture, &style, &FlowStyle::default()).map_err(JobError::content)
     }
 
     /// The pressures, NaN where nothing flows in a compartment of unknown pressure: those would stretch the colours.

@@ -1,7 +1,7 @@
 //! From options to a problem on a grid.
 
 use atomesh::mesh::is_feature_name;
-use atomesh_flow::{Barrier, Control, Grid, Permeability, Problem, Well};
+use atomesh_flow::{Barrier, Control, FlowGrid, Permeability, Problem, Well};
 
 use super::options::FlowOptions;
 use crate::error::JobError;
@@ -13,7 +13,7 @@ use crate::values::{BarrierSpec, SideSpec, WellSpec};
 /// [`JobError`] if a well has another number of coordinates than `D`, or nothing flows.
 pub(super) fn problem<const D: usize>(
     options: &FlowOptions,
-    grid: &Grid<D>,
+    grid: &FlowGrid<D>,
     permeability: Permeability<D>,
 ) -> Result<Problem<'static, D>, JobError> {
     let (wells, open) = wells(&options.source, &options.sink)?;

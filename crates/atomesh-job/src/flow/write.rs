@@ -6,7 +6,7 @@ use atomesh::geometry::Point;
 use atomesh::image::Frame;
 use atomesh::watch::Phase;
 use atomesh_flow::Setting;
-use atomesh_flow::streamlines::{Porosity, Streamline, TraceOptions, time_of_flight, trace};
+use atomesh_flow::streamlines::{Porosity, Streamline, TraceOptions};
 use atomesh_io::atomic_file::AtomicFile;
 use atomesh_io::mesh::cells::CellData;
 use atomesh_io::mesh::vtu::{write_broken_vtu, write_cells_vtu_with};
@@ -29,26 +29,27 @@ pub(super) struct FlowWriting<'a, const D: usize> {
     files: &'a FlowFiles,
     answer: &'a FlowAnswer<D>,
     setting: Setting<'a, D>,
+    dimension: &'a Dimension<D>,
 }
 
 impl<'a, const D: usize> FlowWriting<'a, D> {
-    pub fn new(files: &'a FlowFiles, answer: &'a FlowAnswer<D>) -> Self {
-        Self { files, answer, setting: answer.setting() }
+    pub fn new(
+        files: &'a FlowFiles,
+        answer: &'a FlowAnswer<D>,
+        dimension: &'a Dimension<D>,
+    ) -> Self {
+        Self { files, answer, setting: answer.setting(&dimension.flow), dimension }
     }
 
     /// Writes everything.
     ///
     /// # Errors
     /// [`JobError`] if a file cannot be written, or the watch ends the work.
-    pub fn write(
-        &self,
-        dimension: &Dimension<D>,
-        session: &mut Session<'_>,
-    ) -> Result<(), JobError> {
+    pub fn write(&self, session: &mut Session<'_>) -> Result<(), JobError> {
         let needs_lines = self.files.streamlines.is_some() || self.files.shows_streamlines;
         let lines = if needs_lines { self.lines(session)? } else { Vec::new() };
         session.writing(|session| {
-            self.draw(&lines, dimension, session)?;
+            self.draw(&lines, session)?;
             session.begin(Phase::Write);
             if let Some(path) = &self.files.output {
                 self.write_output(path, session)?;
@@ -64,7 +65,7 @@ impl<'a, const D: usize> FlowWriting<'a, D> {
             }
             session.end_phase();
             if let Some(path) = &self.files.report {
-                let report = self.answer.report(&self.setting, session);
+                let report = self.answer.report(&self.setting, &self.dimension.flow, session);
                 write_bytes(path, format!("{report:#}\n").as_bytes())?;
             }
             Ok(())
@@ -78,15 +79,11 @@ impl<'a, const D: usize> FlowWriting<'a, D> {
             ..TraceOptions::default()
         };
         let FlowAnswer { grid, solution, .. } = self.answer;
+        let trace = self.dimension.flow.trace;
         Ok(trace(grid, &self.setting, solution, &options, session)?)
     }
 
-    fn draw(
-        &self,
-        lines: &[Streamline<D>],
-        dimension: &Dimension<D>,
-        session: &mut Session<'_>,
-    ) -> Result<(), JobError> {
+    fn draw(&self, lines: &[Streamline<D>], session: &mut Session<'_>) -> Result<(), JobError> {
         let Some(file) = &self.files.picture else { return Ok(()) };
         session.begin(Phase::Draw);
         let drawing = FlowDrawing {
@@ -95,7 +92,7 @@ impl<'a, const D: usize> FlowWriting<'a, D> {
             shows_pressure: self.files.shows_pressure,
             lines: if self.files.shows_streamlines { lines } else { &[] },
         };
-        file.write(&drawing.picture(dimension)?)
+        file.write(&drawing.picture(self.dimension)?)
     }
 
     /// Writes the mesh with what is known of its cells.
@@ -103,6 +100,7 @@ impl<'a, const D: usize> FlowWriting<'a, D> {
         let FlowAnswer { mesh, grid, solution, velocities, .. } = self.answer;
         let permeability = self.answer.permeabilities();
         let porosity = Porosity::Constant(self.answer.porosity);
+        let time_of_flight = self.dimension.flow.time_of_flight;
         let times = time_of_flight(grid, &self.setting, solution, porosity, session)?;
         let never = |t: f64| if t.is_finite() { t } else { f64::NAN };
         let times: Vec<f64> = times.into_iter().map(never).collect();

@@ -56,8 +56,8 @@ impl<const D: usize> Writing<'_, D> {
             let backdrop = self.backdrop()?;
             let image = backdrop.as_ref().unwrap_or(image);
             let picture = match self.outcome.sample_cells() {
-                Some(cells) => (self.dimension.draw_cells)(image, &cells, &style),
-                None => (self.dimension.draw)(image, &self.outcome.sample_mesh(), &style),
+                Some(cells) => (self.dimension.drawing.cells)(image, &cells, &style),
+                None => (self.dimension.drawing.mesh)(image, &self.outcome.sample_mesh(), &style),
             };
             file.write(&picture.map_err(JobError::content)?)?;
         }
