@@ -4,8 +4,8 @@ use atomesh::image::Image;
 use atomesh::mesh::{Mesh, PolyMesh};
 use atomesh::run::Method;
 use atomesh_draw::{
-    DrawError, FlowPicture, FlowStyle, Picture, Style, draw_flat, draw_flow, draw_flow_slices,
-    draw_polygons, draw_polyhedra, draw_slices,
+    DrawError, FlowPicture, FlowStyle, Picture, Style, draw_flow, draw_flow_slices, draw_polygons,
+    draw_polyhedra, draw_slices, draw_triangles,
 };
 use atomesh_io::image::AnyImage;
 
@@ -32,7 +32,7 @@ impl Dimension<2> {
     pub fn flat() -> Self {
         Self {
             method: Method::plane(),
-            draw: draw_flat,
+            draw: draw_triangles,
             draw_cells: draw_polygons,
             draw_flow: |flow, style, flow_style| draw_flow(flow, style, flow_style),
             image: |any| match any {

@@ -142,7 +142,7 @@ impl Meshing<'_> {
                     .advise("places are in world coordinates; atomesh info IMAGE shows the box")
             }
             RunError::Enhance(EnhanceError::OutOfRange { .. })
-            | RunError::Potential(FieldError::OutOfRange { .. }) => {
+            | RunError::Potential(FieldError::Potential { .. }) => {
                 Failure::content(error).about(&self.potential_path())
             }
             RunError::Enhance(EnhanceError::NotFinite { .. }) => {

@@ -4,7 +4,7 @@
 //! fifth of d and relaxes without a perturbation, as an editor does; `defaults` are the optimizer's own.
 
 use atomesh::edit::{AtomId, Editor};
-use atomesh::fields::{Fields, ImageWeight, Interpolation, NominalDistance, ScalarField};
+use atomesh::fields::{FieldsView, ImageWeight, Interpolation, NominalDistance, ScalarField};
 use atomesh::geometry::{Point, distance_squared};
 use atomesh::image::Grid;
 use atomesh::lattice::{Crystal, GrowOptions, grow};
@@ -29,7 +29,7 @@ fn gesture<const D: usize>(
     let potential = ScalarField::new(grid, samples, Interpolation::Linear).expect("a potential");
     let weight = ImageWeight::constant(0.45).expect("a weight");
     let distance = NominalDistance::constant(&grid, DISTANCE).expect("a distance");
-    let fields = Fields { potential: &potential, weight: &weight, distance: &distance };
+    let fields = FieldsView { potential: &potential, weight: &weight, distance: &distance };
     let lattice = grow(crystal, grid.bounds(), &distance, &GrowOptions::default(), &mut Silent);
     let options = OptimizeOptions::for_dimension(D);
     let lattice = optimize(lattice.expect("a lattice"), fields, &options, &mut Silent);

@@ -4,7 +4,7 @@ use std::path::{Path, PathBuf};
 
 use atomesh::mesh::PolyMesh;
 use atomesh_flow::two_point::transmissibilities;
-use atomesh_flow::{FlowError, Grid, Permeability, Problem, Setting};
+use atomesh_flow::{FlowError, FlowGrid, Permeability, Problem, Setting};
 use atomesh_io::mesh::MeshWriteError;
 use atomesh_io::mesh::cells::{
     AnyCells, CellData, CellReadError, ConnectionFiles, Flow, LoadedCells, ModflowFiles, Rock,
@@ -137,7 +137,7 @@ fn export<const D: usize>(
     cells: &LoadedCells<D>,
     watch: &mut Progress,
 ) -> Result<String, Failure> {
-    let grid = Grid::of_cells(&cells.mesh, Some(&cells.features));
+    let grid = FlowGrid::of_cells(&cells.mesh, Some(&cells.features));
     let barriers = args.barrier.iter().map(BarrierSpec::barrier).collect();
     let permeability = permeability(args, cells)?;
     let problem = Problem { permeability, barriers, ..Problem::default() };

@@ -234,7 +234,7 @@ fn along<const D: usize>(
         })?;
         (*image.frame(), enhanced.values)
     };
-    let potential = ScalarField::new(frame.grid(units), samples, options.interpolation);
+    let potential = ScalarField::potential(frame.grid(units), samples, options.interpolation);
     let potential = potential.map_err(Failure::content).map_err(about)?;
     let mesh = lattice_mesh(&loaded.mesh, &frame, units);
     FacetField::along(&mesh, &potential, watch).map_err(failure)

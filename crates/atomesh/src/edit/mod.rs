@@ -147,7 +147,7 @@ impl<const D: usize> Editor<D> {
                 return Err(error);
             }
         };
-        let freedom = !self.sides(&at) & ((1 << D) - 1);
+        let freedom = self.bounds.freedom(&at);
         self.states.push(State { is_removed: false, is_pinned: false, freedom, temperature: 1.0 });
         self.bins.push(&at);
         Ok((AtomId(atom), Changes::new(cells, Vec::new())))
@@ -159,7 +159,7 @@ impl<const D: usize> Editor<D> {
     /// [`EditError`] if there is no such atom, it is pinned, or it is a corner of the box.
     pub fn remove(&mut self, atom: AtomId) -> Result<Changes<D>, EditError> {
         let p = self.place_unpinned(atom)?;
-        if self.sides(&p).count_ones() as usize == D {
+        if self.bounds.is_corner(&p) {
             return Err(EditError::Corner { atom });
         }
         let cells = self.follow(&[AtomEdit { atom: atom.0, to: None }])?;
@@ -177,14 +177,14 @@ impl<const D: usize> Editor<D> {
     pub fn move_to(&mut self, atom: AtomId, to: Point<D>) -> Result<Changes<D>, EditError> {
         let from = self.place_unpinned(atom)?;
         self.check_inside(&to)?;
-        let sides = self.sides(&from);
-        if let Some(axis) = (0..D).find(|&k| sides >> k & 1 == 1 && to[k] != from[k]) {
+        let held = self.bounds.held(&from);
+        if let Some(axis) = (0..D).find(|&k| held >> k & 1 == 1 && to[k] != from[k]) {
             return Err(EditError::Held { atom, axis });
         }
         let unmoved = from == to;
         let edit = AtomEdit { atom: atom.0, to: Some(to) };
         let changes = self.make(if unmoved { &[] } else { std::slice::from_ref(&edit) })?;
-        self.states[atom.0 as usize].freedom &= !self.sides(&to);
+        self.states[atom.0 as usize].freedom &= self.bounds.freedom(&to);
         Ok(changes)
     }
 
@@ -302,12 +302,6 @@ impl<const D: usize> Editor<D> {
             return Err(EditError::Pinned { atom });
         }
         Ok(self.points[atom.0 as usize])
-    }
-
-    /// Bit k: the place is on a side of the box across axis k.
-    fn sides(&self, p: &Point<D>) -> u8 {
-        let is_on = |k: usize| p[k] == self.bounds.min[k] || p[k] == self.bounds.max[k];
-        (0..D).fold(0, |set, k| set | u8::from(is_on(k)) << k)
     }
 
     fn check_inside(&self, p: &Point<D>) -> Result<(), EditError> {

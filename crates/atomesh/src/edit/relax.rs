@@ -3,7 +3,7 @@
 use super::cells::AtomEdit;
 use super::{Changes, EditError, Editor};
 use crate::energy::pair;
-use crate::fields::Fields;
+use crate::fields::FieldsView;
 use crate::geometry::{Point, distance_squared};
 use crate::lattice::Lattice;
 use crate::optimize::{OptimizeOptions, OptimizeReport, optimize};
@@ -29,7 +29,7 @@ impl<const D: usize> Editor<D> {
         &mut self,
         around: &Point<D>,
         reach: f64,
-        fields: Fields<'_, D>,
+        fields: FieldsView<'_, D>,
         options: &OptimizeOptions,
         watch: &mut dyn Watch,
     ) -> Result<(OptimizeReport, Changes<D>), EditError> {
@@ -58,7 +58,7 @@ impl<const D: usize> Editor<D> {
 
     /// The farthest from which an atom within reach feels another: with dᵢ and dⱼ at the two,
     /// r < c (dᵢ + dⱼ)/2, where dⱼ ≤ dᵢ + r times the greatest slope of d.
-    fn farthest_felt(&self, around: &Point<D>, reach: f64, fields: Fields<'_, D>) -> f64 {
+    fn farthest_felt(&self, around: &Point<D>, reach: f64, fields: FieldsView<'_, D>) -> f64 {
         let distance = fields.distance;
         let mut greatest = distance.at(around);
         for atom in self.within(around, reach) {

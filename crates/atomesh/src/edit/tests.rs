@@ -5,7 +5,7 @@ use rand::{RngExt, SeedableRng};
 use rand_pcg::Pcg64;
 
 use super::*;
-use crate::fields::{Fields, ImageWeight, Interpolation, NominalDistance, ScalarField};
+use crate::fields::{FieldsView, ImageWeight, Interpolation, NominalDistance, ScalarField};
 use crate::geometry::distance_squared;
 use crate::image::Grid;
 use crate::lattice::{Crystal, GrowOptions, grow};
@@ -187,8 +187,8 @@ impl<const D: usize> Sheet<D> {
         }
     }
 
-    fn fields(&self) -> Fields<'_, D> {
-        Fields { potential: &self.potential, weight: &self.weight, distance: &self.distance }
+    fn fields(&self) -> FieldsView<'_, D> {
+        FieldsView { potential: &self.potential, weight: &self.weight, distance: &self.distance }
     }
 }
 

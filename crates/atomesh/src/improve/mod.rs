@@ -15,7 +15,7 @@ mod space;
 pub use plane::PlaneImprover;
 pub use space::SpaceImprover;
 
-use crate::fields::Fields;
+use crate::fields::FieldsView;
 use crate::mesh::{Mesh, MeshError};
 use crate::watch::{Cancelled, Watch};
 
@@ -120,7 +120,7 @@ pub trait Improver<const D: usize>: Sync {
         &self,
         mesh: Mesh<D>,
         freedom: &[u8],
-        fields: Fields<'_, D>,
+        fields: FieldsView<'_, D>,
         options: &ImproveOptions,
         watch: &mut dyn Watch,
     ) -> Result<(Mesh<D>, ImproveReport), ImproveError>;

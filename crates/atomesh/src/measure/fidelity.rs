@@ -15,7 +15,7 @@ use crate::geometry::linear::invert;
 use crate::geometry::{Point, difference};
 use crate::image::{Frame, Image, Samples, Units};
 use crate::mesh::Mesh;
-use crate::sample::{SampleOptions, Statistic, sample, sample_placed};
+use crate::sample::{SampleOptions, Statistic, sample, sample_in_frame};
 use crate::watch::{Phase, Watch, check};
 use rayon::prelude::*;
 use std::sync::atomic::{AtomicU32, Ordering};
@@ -80,7 +80,7 @@ pub fn fidelity<const D: usize>(
 ) -> Result<FidelityReport, MeasureError> {
     let none = MeasureError::NoCells { points: mesh.points().len() };
     let kinds = [Statistic::Mean, Statistic::Std];
-    let found = sample_placed(mesh, frame, samples, SampleOptions::new(&kinds), watch)?;
+    let found = sample_in_frame(mesh, frame, samples, SampleOptions::new(&kinds), watch)?;
     let [means, deviations] = [&found.values[0], &found.values[1]];
     let weight = |i: usize| found.measures[i] * found.coverage[i];
     let weighted = |i: usize, value: f64| if weight(i) > 0.0 { weight(i) * value } else { 0.0 };

@@ -140,19 +140,14 @@ fn build<const D: usize>(
 ) {
     let mut bounds = bounds_of(&placed[0].facet.map(|c| points[c as usize]));
     for p in &placed[1..] {
-        let more = bounds_of(&p.facet.map(|c| points[c as usize]));
-        for k in 0..D {
-            bounds.min[k] = bounds.min[k].min(more.min[k]);
-            bounds.max[k] = bounds.max[k].max(more.max[k]);
-        }
+        bounds.join(&bounds_of(&p.facet.map(|c| points[c as usize])));
     }
     let end = start + placed.len();
     if placed.len() <= LEAF {
         nodes[0] = Node { bounds, start, end, second: 0 };
         return;
     }
-    let extent = bounds.extent();
-    let axis = (1..D).fold(0, |best, k| if extent[k] > extent[best] { k } else { best });
+    let axis = bounds.longest_axis();
     let half = placed.len() / 2;
     placed.select_nth_unstable_by(half, |a, b| a.middle[axis].total_cmp(&b.middle[axis]));
     let (first, second) = placed.split_at_mut(half);
@@ -174,12 +169,7 @@ fn build<const D: usize>(
 /// The box of a facet.
 fn bounds_of<const D: usize>(corners: &[Point<D>; D]) -> Bounds<D> {
     let mut bounds = Bounds { min: corners[0], max: corners[0] };
-    for p in &corners[1..] {
-        for k in 0..D {
-            bounds.min[k] = bounds.min[k].min(p[k]);
-            bounds.max[k] = bounds.max[k].max(p[k]);
-        }
-    }
+    corners[1..].iter().for_each(|p| bounds.include(p));
     bounds
 }
 

@@ -67,7 +67,7 @@ impl MeshReport {
     ) -> Result<Self, MeasureError> {
         let spread = spread(mesh, size, watch)?;
         let shape = shape(mesh, bounds.as_ref(), watch)?;
-        let size = samples_of(size.mean, grid);
+        let size = grid.in_samples(size.mean);
         let b = SampledPotential { values: potential, shape: grid.shape };
         let found = features(b, size, watch)?;
         let options = AlignmentOptions::new(size);
@@ -77,11 +77,6 @@ impl MeshReport {
         alignment.selected = Some(selected);
         Ok(Self { shape, alignment, spread, fidelity: None, homogeneity: None })
     }
-}
-
-/// A length in samples: by the geometric mean over the axes, where steps differ.
-fn samples_of<const D: usize>(length: f64, grid: &Grid<D>) -> f64 {
-    length / grid.step.iter().product::<f64>().powf(1.0 / D as f64)
 }
 
 /// [`Outcome::cells_report`].
@@ -94,7 +89,7 @@ pub(super) fn of_cells<const D: usize>(
     };
     let (potential, distance) = (outcome.potential(), outcome.distance());
     let grid = potential.grid();
-    let size = samples_of(distance.mean(), grid);
+    let size = grid.in_samples(distance.mean());
     let valleys: Vec<f32> = potential.samples().iter().map(|b| -b.abs()).collect();
     let b = SampledPotential { values: &valleys, shape: grid.shape };
     let found = features(b, size, watch)?;

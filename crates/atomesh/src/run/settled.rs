@@ -111,7 +111,7 @@ fn connect_within<const D: usize>(
     outline: &Outline<D>,
     watch: &mut dyn Watch,
 ) -> Result<Trimmed<D>, RunError> {
-    let Parts { method, distance, .. } = run.parts();
+    let (Parts { method, .. }, distance) = (run.parts(), run.distance());
     let outlined = Outlined::new(lattice, outline, distance);
     if outlined.lattice().len() <= D {
         return Err(RegionError::SmallMask { distance: distance.least() }.into());

@@ -3,7 +3,7 @@
 use std::fmt::Write as _;
 
 use atomesh_flow::dg::DgSolution;
-use atomesh_flow::{Grid, Setting, Solution};
+use atomesh_flow::{FlowGrid, Setting, Solution};
 use serde_json::json;
 
 use super::ground::Ground;
@@ -14,7 +14,7 @@ pub struct Answer<'a, const D: usize> {
     /// What it was computed on.
     pub ground: &'a Ground<D>,
     /// Cells and facets.
-    pub grid: &'a Grid<D>,
+    pub grid: &'a FlowGrid<D>,
     /// The problem.
     pub setting: &'a Setting<'a, D>,
     /// Pressures and fluxes.

@@ -7,7 +7,7 @@ use atomesh::image::{Frame, Image, Units};
 use atomesh::mesh::{Mesh, PolyMesh, Tags};
 use atomesh::run::Outcome;
 use atomesh_flow::dg::{self, Form};
-use atomesh_flow::{FlowError, Grid, Problem, Setting, two_point};
+use atomesh_flow::{FlowError, FlowGrid, Problem, Setting, two_point};
 use atomesh_io::image::{AnyImage, ImageFormat};
 use atomesh_io::mesh::cells::{AnyCells, CellReadError, LoadedCells, read_cells};
 use atomesh_io::mesh::{AnyMesh, LoadedMesh, MeshFormat, OwnedField, Provenance};
@@ -249,8 +249,8 @@ fn solve<const D: usize>(
     watch: &mut Progress,
 ) -> Result<String, Failure> {
     let grid = match &ground.body {
-        Body::Polytopes(cells, features) => Grid::of_cells(cells, Some(features)),
-        Body::Simplices(mesh, tags) => Grid::of_mesh(mesh, tags),
+        Body::Polytopes(cells, features) => FlowGrid::of_cells(cells, Some(features)),
+        Body::Simplices(mesh, tags) => FlowGrid::of_mesh(mesh, tags),
     };
     let (wells, open) = wells::wells(&flow.source, &flow.sink)?;
     let names = grid.sets().iter().map(|set| set.name.as_str());

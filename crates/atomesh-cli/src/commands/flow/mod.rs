@@ -10,7 +10,7 @@ pub mod wells;
 use std::path::PathBuf;
 
 use atomesh_flow::dg::{DgOptions, Form};
-use atomesh_flow::solve::{Method, SolveOptions};
+use atomesh_flow::solve::{SolveMethod, SolveOptions};
 
 use crate::failure::Failure;
 use crate::frame_options::FrameOptions;
@@ -128,8 +128,8 @@ struct FlowOptions {
     order: Option<u8>,
     /// How equations are solved
     #[arg(long, value_name = "METHOD", default_value = "auto",
-        value_parser = named::<Method>(&["auto", "direct", "iterative"]))]
-    solver: Method,
+        value_parser = named::<SolveMethod>(&["auto", "direct", "iterative"]))]
+    solver: SolveMethod,
     /// Share of the right-hand side that iteration may leave
     #[arg(long, value_name = "SHARE", default_value_t = SolveOptions::default().tolerance,
         value_parser = number_in(1e-15, 1e-2, "a number from 1e-15 to 0.01"))]

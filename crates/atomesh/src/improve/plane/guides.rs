@@ -5,7 +5,7 @@
 //! counts is relative to the deepest tenth of them, since smoothing thin features took most of their depth.
 
 use crate::crests::{FeaturePoint, ValleySearch, bottoms, in_large_groups, strongest};
-use crate::fields::{Fields, ScalarField};
+use crate::fields::{FieldsView, ScalarField};
 use crate::geometry::Point;
 use crate::watch::{Cancelled, Phase, Watch};
 
@@ -34,10 +34,10 @@ pub(super) struct Guide {
 
 /// The guides of b where β is above 0.
 pub(super) fn find_guides(
-    fields: Fields<'_, 2>,
+    fields: FieldsView<'_, 2>,
     watch: &mut dyn Watch,
 ) -> Result<Vec<Guide>, Cancelled> {
-    let Fields { potential, weight, distance } = fields;
+    let FieldsView { potential, weight, distance } = fields;
     if weight.as_constant() == Some(0.0) || potential.range().0 > -LEAST_DEPTH {
         return Ok(Vec::new());
     }

@@ -26,7 +26,7 @@ mod tests;
 mod triangles;
 
 use super::{Align, ImproveError, ImproveOptions, ImproveReport, Improver};
-use crate::fields::{Fields, NominalDistance};
+use crate::fields::{FieldsView, NominalDistance};
 use crate::mesh::Mesh;
 use crate::watch::{Cancelled, Phase, Watch, check};
 
@@ -54,7 +54,7 @@ impl Improver<2> for PlaneImprover {
         &self,
         mesh: Mesh<2>,
         freedom: &[u8],
-        fields: Fields<'_, 2>,
+        fields: FieldsView<'_, 2>,
         options: &ImproveOptions,
         watch: &mut dyn Watch,
     ) -> Result<(Mesh<2>, ImproveReport), ImproveError> {

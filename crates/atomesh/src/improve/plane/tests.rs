@@ -9,7 +9,7 @@ use super::energy::{Edge, Energy, Shape, least_sine};
 use super::guides::{Guide, find_guides};
 use super::triangles::Triangles;
 use crate::crests::FeaturePoint;
-use crate::fields::{Fields, ImageWeight, Interpolation, NominalDistance, ScalarField};
+use crate::fields::{FieldsView, ImageWeight, Interpolation, NominalDistance, ScalarField};
 use crate::geometry::{Bounds, Point, difference, dot};
 use crate::image::Grid;
 use crate::lattice::{Crystal, GrowOptions, grow};
@@ -55,7 +55,7 @@ impl Scene {
             let p = [(i % columns) as f64 * grid.step[0], (i / columns) as f64 * grid.step[1]];
             (-depth * (-0.5 * (line.off(&p) / 1.5).powi(2)).exp()) as f32
         });
-        let potential = ScalarField::new(grid, samples.collect(), Interpolation::Spline);
+        let potential = ScalarField::potential(grid, samples.collect(), Interpolation::Spline);
         Self {
             potential: potential.unwrap(),
             weight: ImageWeight::constant(0.45).unwrap(),
@@ -64,8 +64,8 @@ impl Scene {
         }
     }
 
-    fn fields(&self) -> Fields<'_, 2> {
-        Fields { potential: &self.potential, weight: &self.weight, distance: &self.distance }
+    fn fields(&self) -> FieldsView<'_, 2> {
+        FieldsView { potential: &self.potential, weight: &self.weight, distance: &self.distance }
     }
 
     fn bounds(&self) -> Bounds<2> {

@@ -30,7 +30,7 @@ mod tests;
 mod tetrahedra;
 
 use super::{Align, ImproveError, ImproveOptions, ImproveReport, Improver};
-use crate::fields::Fields;
+use crate::fields::FieldsView;
 use crate::geometry::{Bounds, Point};
 use crate::mesh::Mesh;
 use crate::watch::{Phase, Watch, check};
@@ -53,7 +53,7 @@ const ROUNDS: usize = 6;
 struct Work<'a> {
     /// −b; `None` where β is 0 everywhere, and facets have nothing to follow.
     field: Option<DepthField<'a>>,
-    fields: Fields<'a, 3>,
+    fields: FieldsView<'a, 3>,
     align: Align,
     /// The greatest cosine of a dihedral angle.
     cosine_limit: f64,
@@ -64,7 +64,7 @@ impl Improver<3> for SpaceImprover {
         &self,
         mesh: Mesh<3>,
         freedom: &[u8],
-        fields: Fields<'_, 3>,
+        fields: FieldsView<'_, 3>,
         options: &ImproveOptions,
         watch: &mut dyn Watch,
     ) -> Result<(Mesh<3>, ImproveReport), ImproveError> {

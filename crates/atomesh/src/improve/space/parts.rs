@@ -6,7 +6,7 @@
 //! neighbourhood of held points alone.
 
 use super::shape::shape;
-use super::tetrahedra::{NONE, Tetrahedra, sides_of};
+use super::tetrahedra::{NONE, Tetrahedra};
 use crate::geometry::{Bounds, Point};
 use rayon::prelude::*;
 
@@ -76,8 +76,7 @@ fn parts_of(points: &[Point<3>], cut: f64) -> (Vec<u32>, usize) {
 fn halves<'a>(points: &[Point<3>], slice: &'a mut [u32], cut: f64) -> [&'a mut [u32]; 2] {
     let mut bounds = Bounds { min: [f64::INFINITY; 3], max: [f64::NEG_INFINITY; 3] };
     slice.iter().for_each(|&i| bounds.include(&points[i as usize]));
-    let extent = bounds.extent();
-    let axis = (1..3).fold(0, |best, k| if extent[k] > extent[best] { k } else { best });
+    let axis = bounds.longest_axis();
     let middle = (slice.len() as f64 * cut) as usize;
     if middle > 0 && middle < slice.len() {
         slice.select_nth_unstable_by(middle, |&a, &b| {
@@ -91,9 +90,9 @@ fn halves<'a>(points: &[Point<3>], slice: &'a mut [u32], cut: f64) -> [&'a mut [
 impl WholeMesh {
     /// The mesh as it is given.
     pub fn new(points: Vec<Point<3>>, freedom: &[u8], corners: &[u32], bounds: &Bounds<3>) -> Self {
-        let sides: Vec<u8> = points.iter().map(|p| sides_of(p, bounds)).collect();
+        let sides: Vec<u8> = points.iter().map(|p| bounds.sides(p, 0.0)).collect();
         // whatever the lattice says, a point on a side stays on it
-        let freedom = freedom.iter().zip(&sides).map(|(f, s)| f & !(s | s >> 3)).collect();
+        let freedom = freedom.iter().zip(&points).map(|(f, p)| f & bounds.freedom(p)).collect();
         let corners = corners.chunks_exact(4).map(|c| [c[0], c[1], c[2], c[3]]).collect();
         Self { points, freedom, sides, corners }
     }

@@ -46,7 +46,7 @@ fn improve(
 ) -> Result<(Mesh<3>, ImproveReport), ImproveError> {
     let weight = ImageWeight::constant(beta).unwrap();
     let distance = NominalDistance::constant(potential.grid(), 3.0).unwrap();
-    let fields = Fields { potential, weight: &weight, distance: &distance };
+    let fields = FieldsView { potential, weight: &weight, distance: &distance };
     let freedom = vec![7; mesh.points().len()];
     SpaceImprover.improve(mesh, &freedom, fields, options, &mut Silent)
 }
@@ -63,7 +63,7 @@ fn crystal(shifts: &[f64]) -> Vec<Point<3>> {
 }
 
 fn sides(p: &Point<3>) -> u8 {
-    tetrahedra::sides_of(p, &Bounds { min: [0.0; 3], max: [SIDE; 3] })
+    Bounds { min: [0.0; 3], max: [SIDE; 3] }.sides(p, 0.0)
 }
 
 proptest! {
@@ -227,7 +227,7 @@ fn a_floor_out_of_range_is_refused_and_a_watch_ends_the_work() {
     let potential = potential(sheet);
     let weight = ImageWeight::constant(0.4).unwrap();
     let distance = NominalDistance::constant(potential.grid(), 3.0).unwrap();
-    let fields = Fields { potential: &potential, weight: &weight, distance: &distance };
+    let fields = FieldsView { potential: &potential, weight: &weight, distance: &distance };
     let freedom = vec![7; mesh.points().len()];
     let options = ImproveOptions::for_dimension(3);
     let ended = SpaceImprover.improve(mesh, &freedom, fields, &options, &mut Never);

@@ -5,7 +5,7 @@
 //! there stay, unless they lie on a side of the box.
 
 use super::shape::{Shape, shape};
-use crate::geometry::{Bounds, Point};
+use crate::geometry::Point;
 
 /// No cell, no point.
 pub(super) const NONE: u32 = u32::MAX;
@@ -40,14 +40,6 @@ struct Facet {
     cell: u32,
     /// The corner opposite it.
     place: u32,
-}
-
-/// The sides of the box that a point lies on, as bits.
-pub(super) fn sides_of(p: &Point<3>, bounds: &Bounds<3>) -> u8 {
-    (0..3).fold(0, |bits, k| {
-        let low = u8::from(p[k] <= bounds.min[k]) << k;
-        bits | low | u8::from(p[k] >= bounds.max[k]) << (3 + k)
-    })
 }
 
 /// Three corners, ascending.

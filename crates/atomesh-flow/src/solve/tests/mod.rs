@@ -1,3 +1,8 @@
+//! Every way to solve gives the right answer or an error.
+
+mod order;
+mod sparse;
+
 use std::ops::ControlFlow;
 
 use atomesh::geometry::Point;
@@ -6,6 +11,7 @@ use proptest::prelude::*;
 use rand::{RngExt, SeedableRng};
 use rand_pcg::Pcg64;
 
+use super::vector::norm;
 use super::*;
 
 /// Equations that own their parts.
@@ -31,7 +37,7 @@ impl<const D: usize> Owned<D> {
 
     fn answer(
         &self,
-        method: Method,
+        method: SolveMethod,
         is_symmetric: bool,
     ) -> Result<(Vec<f64>, SolveReport), SolveError> {
         let options = SolveOptions { method, ..Default::default() };
@@ -40,11 +46,11 @@ impl<const D: usize> Owned<D> {
 }
 
 /// All ways to solve symmetric equations.
-const WAYS: [(Method, bool); 4] = [
-    (Method::Direct, true),
-    (Method::Iterative, true),
-    (Method::Direct, false),
-    (Method::Iterative, false),
+const WAYS: [(SolveMethod, bool); 4] = [
+    (SolveMethod::Direct, true),
+    (SolveMethod::Iterative, true),
+    (SolveMethod::Direct, false),
+    (SolveMethod::Iterative, false),
 ];
 
 /// Two-point flux on n^D unit cubes of permeability k, pressure 0 at a distance of one beyond both ends of each axis.
@@ -96,7 +102,7 @@ fn sines_are_divided_by_their_eigenvalues<const D: usize>(n: usize) {
         let error = farthest(&x, &exact);
         assert!(error < 1e-9, "{report:?}: {error}");
         assert!(report.residual <= 1e-12, "{report:?}");
-        assert_eq!(report.iterations > 0, method == Method::Iterative);
+        assert_eq!(report.iterations > 0, method == SolveMethod::Iterative);
     }
 }
 
@@ -172,7 +178,7 @@ proptest! {
         let own = dominant(count, block, seed, is_symmetric);
         let exact = dense_answer(&own.matrix, &own.rhs).unwrap();
         let size = exact.iter().fold(0.0_f64, |most, x| most.max(x.abs()));
-        for method in [Method::Direct, Method::Iterative, Method::Auto] {
+        for method in [SolveMethod::Direct, SolveMethod::Iterative, SolveMethod::Auto] {
             let (x, report) = own.answer(method, is_symmetric).unwrap();
             // dominant by a tenth: a condition number of some 10² beside a residual of 10⁻¹²
             prop_assert!(farthest(&x, &exact) <= 1e-9 * size, "{:?}", report);
@@ -189,7 +195,7 @@ proptest! {
         let rhs: Vec<f64> = rhs.into_iter().map(f64::from).collect();
         let places = (0..6 / block).map(|at| [at as f64, 0.0]).collect();
         let own = Owned::<2> { matrix, rhs, block, places, coarse: None };
-        for method in [Method::Direct, Method::Iterative, Method::Auto] {
+        for method in [SolveMethod::Direct, SolveMethod::Iterative, SolveMethod::Auto] {
             if let Ok((x, report)) = own.answer(method, is_symmetric) {
                 let mut rest = vec![0.0; 6];
                 own.matrix.residual(&own.rhs, &x, &mut rest);
@@ -197,59 +203,6 @@ proptest! {
             }
         }
     }
-
-    #[test]
-    fn each_unknown_is_eliminated_once_and_blocks_stay_together(
-        count in 0_usize..300, block in 1_usize..4, seed: u64, coincide: bool,
-    ) {
-        let mut own = dominant(count, block, seed, false);
-        if coincide {
-            own.places.iter_mut().for_each(|place| place[1] = place[0].round());
-        }
-        let order = Elimination::new(&own.matrix, block, &own.places, (false, f64::INFINITY)).order;
-        let mut sorted = order.clone();
-        sorted.sort_unstable();
-        prop_assert_eq!(sorted, (0..(count * block) as u32).collect::<Vec<_>>());
-        for unknowns in order.chunks(block) {
-            prop_assert!(unknowns.iter().all(|u| u / block as u32 == unknowns[0] / block as u32));
-        }
-    }
-
-    #[test]
-    fn the_values_of_a_factor_are_counted_as_elimination_makes_them(
-        count in 1_usize..40, seed: u64,
-    ) {
-        let own = dominant(count, 1, seed, true);
-        let plan = Elimination::new(&own.matrix, 1, &own.places, (false, f64::INFINITY));
-        let mut full = vec![vec![false; count]; count];
-        own.matrix.entries().for_each(|(i, j, _)| full[i][j] = true);
-        let mut expected = (0.0, 0.0);
-        for (at, &pivot) in plan.order.iter().enumerate() {
-            let rest = &plan.order[at..];
-            let column: Vec<usize> =
-                rest.iter().map(|&u| u as usize).filter(|&u| full[u][pivot as usize]).collect();
-            expected.0 += column.len() as f64;
-            expected.1 += (column.len() as f64).powi(2);
-            for &i in &column {
-                column.iter().for_each(|&j| full[i][j] = true);
-            }
-        }
-        prop_assert_eq!((plan.values, plan.work), expected);
-        let short = Elimination::new(&own.matrix, 1, &own.places, (false, expected.0 - 1.0));
-        prop_assert_eq!(short.values, f64::INFINITY);
-    }
-}
-
-#[test]
-fn dissection_fills_less_than_rows_one_after_another() {
-    let own = cubes::<2>(60, |_| 1.0);
-    let plan = Elimination::new(&own.matrix, 1, &own.places, (false, f64::INFINITY));
-    // by rows a factor holds a band of 60; by dissection some 31/8 log₂ n² of them (George 1973), n = 60: 46, less
-    // the leaves
-    assert!(plan.values < 30.0 * 3600.0, "{}", plan.values / 3600.0);
-    let along = vec![[0.0]; 3600];
-    let bad = Elimination::new(&own.matrix, 1, &along, (false, f64::INFINITY));
-    assert!(plan.values < bad.values, "places matter");
 }
 
 #[test]
@@ -258,7 +211,7 @@ fn permeability_over_eight_decades_is_solved_alike_by_all_ways() {
     let k = |cell: usize| 10.0_f64.powf(8.0 * decades[cell]);
     let mut own = cubes::<3>(15, k);
     own.rhs[7 + 15 * (7 + 15 * 7)] = 1.0;
-    let (reference, _) = own.answer(Method::Direct, true).unwrap();
+    let (reference, _) = own.answer(SolveMethod::Direct, true).unwrap();
     let size = reference.iter().fold(0.0_f64, |most, x| most.max(x.abs()));
     for (method, is_symmetric) in WAYS {
         let (x, report) = own.answer(method, is_symmetric).unwrap();
@@ -273,7 +226,7 @@ fn iterations_hardly_grow_with_the_mesh() {
     let iterations = |n: usize| {
         let mut own = cubes::<2>(n, |_| 1.0);
         own.rhs = random(1, n * n);
-        own.answer(Method::Iterative, true).unwrap().1.iterations
+        own.answer(SolveMethod::Iterative, true).unwrap().1.iterations
     };
     let (few, many) = (iterations(40), iterations(160));
     assert!(many <= few + few / 2, "{few}, {many}: a Krylov method alone takes four times as many");
@@ -324,9 +277,9 @@ fn a_coarse_space_keeps_iterations_few() {
     let iterations = |n: usize, has_coarse: bool| {
         let mut own = broken_squares(n);
         own.coarse = own.coarse.filter(|_| has_coarse);
-        let reference = own.answer(Method::Direct, true).unwrap().0;
+        let reference = own.answer(SolveMethod::Direct, true).unwrap().0;
         let counts = [true, false].map(|is_symmetric| {
-            let (x, report) = own.answer(Method::Iterative, is_symmetric).unwrap();
+            let (x, report) = own.answer(SolveMethod::Iterative, is_symmetric).unwrap();
             assert!(farthest(&x, &reference) < 1e-8, "{report:?}");
             report.iterations
         });
@@ -364,7 +317,7 @@ fn equations_without_an_answer_are_errors() {
 fn what_is_not_finite_is_named() {
     let mut own = cubes::<2>(3, |_| 1.0);
     own.rhs[4] = f64::NAN;
-    let error = own.answer(Method::Auto, true).unwrap_err();
+    let error = own.answer(SolveMethod::Auto, true).unwrap_err();
     assert!(matches!(error, SolveError::NotFinite { equation: 4, .. }));
 }
 
@@ -399,7 +352,7 @@ fn bits_do_not_depend_on_threads() {
         pool.install(|| {
             let bits = |x: Vec<f64>| x.into_iter().map(f64::to_bits).collect::<Vec<_>>();
             let scalar = WAYS.map(|(method, symmetric)| own.answer(method, symmetric).unwrap().0);
-            let blocks = broken.answer(Method::Iterative, true).unwrap().0;
+            let blocks = broken.answer(SolveMethod::Iterative, true).unwrap().0;
             (scalar.map(bits), bits(blocks))
         })
     };
@@ -438,9 +391,9 @@ fn factors_larger_than_memory_are_an_error_and_auto_goes_on() {
     let mut own = cubes::<2>(30, |_| 1.0);
     own.rhs[0] = 1.0;
     let options = |method| SolveOptions { method, memory: 1000, ..Default::default() };
-    let error = solve(&own.system(true), &options(Method::Direct), &mut Silent).unwrap_err();
+    let error = solve(&own.system(true), &options(SolveMethod::Direct), &mut Silent).unwrap_err();
     assert_eq!(error, SolveError::Memory { unknowns: 900 });
-    let (_, report) = solve(&own.system(true), &options(Method::Auto), &mut Silent).unwrap();
+    let (_, report) = solve(&own.system(true), &options(SolveMethod::Auto), &mut Silent).unwrap();
     assert!(report.iterations > 0);
 }
 
@@ -448,57 +401,7 @@ fn factors_larger_than_memory_are_an_error_and_auto_goes_on() {
 fn iteration_that_may_not_end_is_an_error() {
     let mut own = cubes::<2>(40, |_| 1.0);
     own.rhs[0] = 1.0;
-    let options = SolveOptions { method: Method::Iterative, limit: 2, ..Default::default() };
+    let options = SolveOptions { method: SolveMethod::Iterative, limit: 2, ..Default::default() };
     let error = solve(&own.system(true), &options, &mut Silent).map(|found| found.1).unwrap_err();
     assert!(matches!(error, SolveError::NotConverged { iterations: 2, .. }), "{error}");
-}
-
-/// A matrix as rows of numbers.
-fn dense(matrix: &Sparse) -> Vec<Vec<f64>> {
-    let mut rows = vec![vec![0.0; matrix.column_count()]; matrix.row_count()];
-    matrix.entries().for_each(|(i, j, v)| rows[i][j] += v);
-    rows
-}
-
-proptest! {
-    #[test]
-    fn products_are_those_of_dense_matrices(
-        a in prop::collection::vec((0_u32..7, 0_u32..5, -3_i8..4), 0..40),
-        b in prop::collection::vec((0_u32..5, 0_u32..6, -3_i8..4), 0..40),
-    ) {
-        let entry = |&(i, j, v): &(u32, u32, i8)| (i, j, f64::from(v));
-        let entries: Vec<_> = a.iter().map(entry).collect();
-        let (a, b) = (
-            Sparse::from_entries(7, 5, &entries),
-            Sparse::from_entries(5, 6, &b.iter().map(entry).collect::<Vec<_>>()),
-        );
-        let mut sums = vec![vec![0.0; 5]; 7];
-        entries.iter().for_each(|&(i, j, v)| sums[i as usize][j as usize] += v);
-        let (left, right, product) = (dense(&a), dense(&b), dense(&a.product(&b)));
-        // whole numbers: no rounding anywhere
-        prop_assert_eq!(&left, &sums);
-        let (turned, x) = (dense(&a.transpose()), [1.0, -2.0, 3.0, 0.5, 4.0]);
-        let mut y = vec![0.0; 7];
-        a.multiply(&x, &mut y);
-        for i in 0..7 {
-            prop_assert_eq!(y[i], (0..5).map(|j| left[i][j] * x[j]).sum::<f64>());
-            for j in 0..5 {
-                prop_assert_eq!(turned[j][i], left[i][j]);
-            }
-            for j in 0..6 {
-                let sum: f64 = (0..5).map(|k| left[i][k] * right[k][j]).sum();
-                prop_assert_eq!(product[i][j], sum);
-            }
-        }
-        let again = Sparse::new(5, a.starts().to_vec(), a.columns().to_vec(), a.values().to_vec());
-        prop_assert_eq!(again, a);
-    }
-}
-
-#[test]
-fn symmetry_is_of_values_and_places() {
-    let of = |entries: &[(u32, u32, f64)]| Sparse::from_entries(2, 2, entries);
-    assert!(of(&[(0, 0, 1.0), (1, 1, 1.0), (0, 1, 0.5), (1, 0, 0.5)]).is_symmetric(0.0));
-    assert!(!of(&[(0, 0, 1.0), (1, 1, 1.0), (0, 1, 0.5), (1, 0, 0.4)]).is_symmetric(0.05));
-    assert!(!of(&[(0, 0, 1.0), (0, 1, 0.5)]).is_symmetric(1.0));
 }

@@ -1,19 +1,23 @@
-//! A flat thing to draw flow on: the plane of a flat mesh, or a slice of one in space.
+//! What flow is drawn on: the plane of a mesh of triangles or polygons, or one slice of a mesh in space.
 
 use std::f64::consts::TAU;
 
 use super::arrow::{Vector, outline, thinned};
-use super::{FlowStyle, clip};
+use super::clip;
+use super::picture::{FlowPicture, FlowStyle};
 use crate::color_map::{PLASMA, Range, VIRIDIS};
 use crate::legend::Bar;
-use crate::picture::{Place, Rect, Shape};
-use crate::{Color, Style};
+use crate::shape::{Place, Rect, Shape};
+use crate::style::{Color, Style};
 
-/// The colours of vectors and of what sets them off from what is dark.
+/// The colours of vectors and of their halos, which set them off from dark ground.
 const VECTOR: Color = [0; 3];
 const HALO: Color = [190; 3];
 
-/// The width in pixels by which barriers and streamlines are set off, on each side.
+/// The colour behind flow without an image: a middle grey, since edges are white.
+pub(super) const NO_IMAGE: Color = [140; 3];
+
+/// The width in pixels of the casing of barriers and streamlines, on each side.
 const CASING: f64 = 1.0;
 const CASING_COLOR: Color = [30; 3];
 
@@ -35,27 +39,35 @@ pub(super) struct Tile {
     pub polygon: Vec<Place>,
 }
 
-/// A well in a sheet.
+/// A well on a canvas.
 pub(super) struct Mark {
     pub place: Place,
     pub is_source: bool,
-    /// Whether it is on the sheet; else it lies before or behind it.
+    /// Whether it lies on the canvas, or nearly; else before or behind it.
     pub is_near: bool,
 }
 
-/// What a sheet shows.
-pub(super) struct Sheet {
+/// What a canvas shows.
+pub(super) struct Canvas {
     pub rect: Rect,
     pub tiles: Vec<Tile>,
     pub edges: Vec<[Place; 2]>,
     pub barriers: Vec<[Place; 2]>,
     pub marks: Vec<Mark>,
-    /// Pieces of streamlines with the time in their middle.
-    pub lines: Vec<(f64, [Place; 2])>,
+    /// Pieces of streamlines.
+    pub lines: Vec<Segment>,
 }
 
-/// What all sheets of a picture share.
-pub(super) struct Looks<'a> {
+/// A piece of a streamline.
+#[derive(Clone, Copy)]
+pub(super) struct Segment {
+    /// The time of flight to its middle.
+    pub time: f64,
+    pub ends: [Place; 2],
+}
+
+/// What all canvases of a picture share.
+pub(super) struct Appearance<'a> {
     pub style: &'a Style,
     pub flow: &'a FlowStyle,
     /// Pressures of all cells, and their range.
@@ -67,8 +79,26 @@ pub(super) struct Looks<'a> {
     pub longest: f64,
 }
 
-impl Looks<'_> {
-    /// What the colours stand for.
+impl<'a> Appearance<'a> {
+    /// The appearance of a picture in which the vector of a brisk flow is `length` pixels long.
+    pub fn new<const D: usize>(
+        flow: &FlowPicture<'a, D>,
+        style: &'a Style,
+        flow_style: &'a FlowStyle,
+        length: f64,
+    ) -> Self {
+        let times = flow.lines.iter().flat_map(|line| line.times).copied();
+        Self {
+            style,
+            flow: flow_style,
+            pressures: flow.pressures,
+            pressure: Range::robust(flow.pressures.iter().copied(), PRESSURE_CUT),
+            time: Range::robust(times, TIME_CUT),
+            longest: length * flow_style.longest_vector,
+        }
+    }
+
+    /// The bars of the legend.
     pub fn bars(&self) -> Vec<Bar> {
         let pressure = self.pressure.map(|range| Bar { name: "PRESSURE", map: VIRIDIS, range });
         let time = self.time.map(|range| Bar { name: "TIME", map: PLASMA, range });
@@ -77,21 +107,21 @@ impl Looks<'_> {
     }
 }
 
-/// The share of cells at each end of the range of pressures that have its last colour: wells' are extreme.
-pub(super) const PRESSURE_CUT: [f64; 2] = [0.005; 2];
+/// The share of cells beyond each end of the colours of pressures: those at wells are extreme.
+const PRESSURE_CUT: [f64; 2] = [0.005; 2];
 
-/// The share of points of streamlines that have the last colour: where it hardly flows, time has no end.
-pub(super) const TIME_CUT: [f64; 2] = [0.0, 0.05];
+/// The share of points of streamlines beyond the last colour of times: where flow is slow, times are extreme.
+const TIME_CUT: [f64; 2] = [0.0, 0.05];
 
-impl Sheet {
-    /// The shapes, without what lies beneath. `along` is a cell's vector in pixels, if it has one.
-    pub fn shapes(&self, looks: &Looks, along: &dyn Fn(usize) -> Option<Place>) -> Vec<Shape> {
+impl Canvas {
+    /// The shapes, without the background. `along` is a cell's vector in pixels, if it has one.
+    pub fn shapes(&self, look: &Appearance, along: &dyn Fn(usize) -> Option<Place>) -> Vec<Shape> {
         let mut shapes = Vec::new();
-        if let Some(range) = looks.pressure {
+        if let Some(range) = look.pressure {
             let tiles = self
                 .tiles
                 .iter()
-                .map(|tile| (looks.pressures[tile.cell], clip::polygon(&tile.polygon, &self.rect)));
+                .map(|tile| (look.pressures[tile.cell], clip::polygon(&tile.polygon, &self.rect)));
             let groups = range.grouped(VIRIDIS, tiles).into_iter();
             shapes.extend(groups.map(|(color, polygons)| Shape::Polygons {
                 polygons,
@@ -99,13 +129,13 @@ impl Sheet {
                 smooth: false,
             }));
         }
-        if looks.style.edges {
-            let (width, color) = (looks.style.edge_width, looks.style.edge_color);
+        if look.style.edges {
+            let (width, color) = (look.style.edge_width, look.style.edge_color);
             shapes.push(Shape::Lines { lines: self.within(&self.edges), width, color });
         }
-        self.push_barriers(looks, &mut shapes);
-        self.push_lines(looks, &mut shapes);
-        self.push_vectors(looks, along, &mut shapes);
+        self.push_barriers(look, &mut shapes);
+        self.push_lines(look, &mut shapes);
+        self.push_vectors(look, along, &mut shapes);
         shapes.extend(self.marks.iter().flat_map(|mark| mark_shapes(mark, &self.rect)));
         shapes
     }
@@ -114,21 +144,21 @@ impl Sheet {
         lines.iter().filter_map(|&line| clip::line(line, &self.rect)).collect()
     }
 
-    fn push_barriers(&self, looks: &Looks, shapes: &mut Vec<Shape>) {
+    fn push_barriers(&self, look: &Appearance, shapes: &mut Vec<Shape>) {
         let lines = self.within(&self.barriers);
         if lines.is_empty() {
             return;
         }
-        let (width, color) = (looks.flow.barrier_width, looks.style.edge_color);
+        let (width, color) = (look.flow.barrier_width, look.style.edge_color);
         let casing =
             Shape::Lines { lines: lines.clone(), width: width + 2.0 * CASING, color: CASING_COLOR };
         shapes.extend([casing, Shape::Lines { lines, width, color }]);
     }
 
-    fn push_lines(&self, looks: &Looks, shapes: &mut Vec<Shape>) {
-        let Some(range) = looks.time else { return };
-        let clipped = |(time, line): &(f64, [Place; 2])| {
-            clip::line(*line, &self.rect).map(|line| (*time, line))
+    fn push_lines(&self, look: &Appearance, shapes: &mut Vec<Shape>) {
+        let Some(range) = look.time else { return };
+        let clipped = |segment: &Segment| {
+            clip::line(segment.ends, &self.rect).map(|line| (segment.time, line))
         };
         let lines: Vec<(f64, [Place; 2])> = self.lines.iter().filter_map(clipped).collect();
         if lines.is_empty() {
@@ -146,7 +176,7 @@ impl Sheet {
 
     fn push_vectors(
         &self,
-        looks: &Looks,
+        look: &Appearance,
         along: &dyn Fn(usize) -> Option<Place>,
         shapes: &mut Vec<Shape>,
     ) {
@@ -154,11 +184,11 @@ impl Sheet {
             let (middle, weight) = middle(&tile.polygon)?;
             let along = along(tile.cell)?;
             let length = along[0].hypot(along[1]);
-            let share = if length > looks.longest { looks.longest / length } else { 1.0 };
+            let share = if length > look.longest { look.longest / length } else { 1.0 };
             Some(Vector { middle, along: along.map(|x| x * share), weight })
         };
         let vectors = self.tiles.iter().filter_map(vector).collect();
-        let vectors = thinned(vectors, looks.flow.vector_spacing);
+        let vectors = thinned(vectors, look.flow.vector_spacing);
         let is_long = |vector: &&Vector| vector.along[0].hypot(vector.along[1]) >= SHORTEST;
         for (halo, color) in [(1.0, HALO), (0.0, VECTOR)] {
             let outlines = vectors.iter().filter(is_long).map(|vector| outline(vector, halo));

@@ -3,14 +3,15 @@
 use atomesh::geometry::{Bounds, Point, difference};
 
 use super::arrow::brisk;
-use super::sheet::{Looks, Mark, PRESSURE_CUT, Sheet, TIME_CUT, Tile};
-use super::{FlowCells, FlowPicture, FlowStyle};
-use crate::color_map::Range;
-use crate::flat::{median, scale};
+use super::canvas::{Appearance, Canvas, Mark, NO_IMAGE, Segment, Tile};
+use super::picture::{FlowCells, FlowPicture, FlowStyle, FlowWell};
+use crate::error::DrawError;
 use crate::legend::put_beside;
-use crate::picture::{Picture, Place, Rect, Shape};
+use crate::picture::Picture;
 use crate::raster::Ramp;
-use crate::{DrawError, Style};
+use crate::scale::{median, scale};
+use crate::shape::{Place, Rect, Shape};
+use crate::style::Style;
 
 /// The margin around a mesh without an image, in pixels.
 const MARGIN: f64 = 10.0;
@@ -21,55 +22,44 @@ const MARGIN: f64 = 10.0;
 /// Cost: O(pixels + samples + cells log cells).
 ///
 /// # Errors
-/// [`DrawError::Style`] if a number of a style has no meaning; [`DrawError::Count`] if there are not as many
-/// velocities, pressures or times as they are for; [`DrawError::Facet`] if a barrier is no facet.
+/// [`DrawError::Style`] if a number of a style is out of range; [`DrawError::Count`] if the number of velocities,
+/// pressures or times is not that of cells or points; [`DrawError::Facet`] if a barrier is not a facet.
 pub fn draw_flow(
-    flow: &FlowPicture<2>,
+    flow: &FlowPicture<'_, 2>,
     style: &Style,
     flow_style: &FlowStyle,
 ) -> Result<Picture, DrawError> {
     let (style, flow_style) = (style.checked()?, flow_style.checked()?);
     flow.check()?;
-    let canvas = Canvas::new(flow, style);
-    let mut picture = Picture::new(canvas.rect.size);
+    let layout = Layout::new(flow, style);
+    let mut picture = Picture::new(layout.rect.size);
     if let (Some(image), true) = (flow.image, flow.pressures.is_empty()) {
         let [columns, rows] = image.frame().shape();
         let ramp = Ramp::robust(image.samples(), style.brightness);
         let raster = ramp.raster(image.samples(), columns, rows, |i, j| i + columns * j);
-        picture.shapes.push(Shape::upright(raster, canvas.rect));
+        picture.shapes.push(Shape::upright(raster, layout.rect));
     } else {
-        picture.shapes.push(Shape::Fill { rect: canvas.rect, color: GROUND });
+        picture.shapes.push(Shape::Fill { rect: layout.rect, color: NO_IMAGE });
     }
-    let in_pixels = |v: &Point<2>| -> Place { [v[0] * canvas.pixels[0], v[1] * canvas.pixels[1]] };
+    let in_pixels = |v: &Point<2>| -> Place { [v[0] * layout.pixels[0], v[1] * layout.pixels[1]] };
     let speed = |v: &Point<2>| in_pixels(v)[0].hypot(in_pixels(v)[1]);
     let brisk = brisk(flow.velocities.iter().map(speed));
-    let length = flow_style.vector_length * canvas.edge_pixels;
+    let length = flow_style.vector_length * layout.edge_pixels;
     let along = |cell: usize| {
         let v = flow.velocities.get(cell).filter(|v| v.iter().all(|x| x.is_finite()))?;
         let share = if brisk > 0.0 { length / brisk } else { 0.0 };
         Some(in_pixels(v).map(|x| x * share))
     };
-    let times = flow.lines.iter().flat_map(|line| line.times).copied();
-    let looks = Looks {
-        style,
-        flow: flow_style,
-        pressures: flow.pressures,
-        pressure: Range::robust(flow.pressures.iter().copied(), PRESSURE_CUT),
-        time: Range::robust(times, TIME_CUT),
-        longest: length * flow_style.longest_vector,
-    };
-    picture.shapes.extend(canvas.sheet(flow).shapes(&looks, &along));
-    put_beside(&mut picture, &looks.bars());
+    let look = Appearance::new(flow, style, flow_style, length);
+    picture.shapes.extend(layout.canvas(flow).shapes(&look, &along));
+    put_beside(&mut picture, &look.bars());
     Ok(picture)
 }
 
-/// What lies beneath where there is no image: a middle grey, since edges are white.
-pub(super) const GROUND: crate::Color = [140; 3];
-
-/// Where points of the mesh are in the picture.
-struct Canvas {
+/// The map from the mesh to the picture.
+struct Layout {
     rect: Rect,
-    /// Pixels to a sample.
+    /// Pixels per sample.
     pixels: Place,
     /// Where sample coordinates 0, 0 are.
     origin: Place,
@@ -77,7 +67,7 @@ struct Canvas {
     edge_pixels: f64,
 }
 
-impl Canvas {
+impl Layout {
     fn new(flow: &FlowPicture<2>, style: &Style) -> Self {
         let step = flow.image.map_or([1.0; 2], |image| image.frame().grid(style.units).step);
         let points = flow.cells.points();
@@ -107,7 +97,7 @@ impl Canvas {
         std::array::from_fn(|k| self.origin[k] + p[k] * self.pixels[k])
     }
 
-    fn sheet(&self, flow: &FlowPicture<2>) -> Sheet {
+    fn canvas(&self, flow: &FlowPicture<2>) -> Canvas {
         let points = flow.cells.points();
         let corner = |&c: &u32| self.place(&points[c as usize]);
         let facets = flow.cells.facets();
@@ -122,16 +112,19 @@ impl Canvas {
                 FlowCells::Polytopes(mesh) => mesh.polygon(cell).iter().map(corner).collect(),
             }
         };
-        let mark = |well: &super::FlowWell<2>| Mark {
+        let mark = |well: &FlowWell<2>| Mark {
             place: self.place(&well.place),
             is_source: well.rate > 0.0,
             is_near: true,
         };
         let lines = flow.lines.iter().flat_map(|line| {
             let pieces = line.points.windows(2).zip(line.times.windows(2));
-            pieces.map(|(p, t)| (0.5 * (t[0] + t[1]), [self.place(&p[0]), self.place(&p[1])]))
+            pieces.map(|(p, t)| Segment {
+                time: 0.5 * (t[0] + t[1]),
+                ends: [self.place(&p[0]), self.place(&p[1])],
+            })
         });
-        Sheet {
+        Canvas {
             rect: self.rect,
             tiles: (0..flow.cells.cell_count())
                 .map(|cell| Tile { cell, polygon: polygon(cell) })
@@ -144,8 +137,8 @@ impl Canvas {
     }
 }
 
-/// The lengths of facets of flat meshes of samples with sides `step`, or of those between them: from site to site
-/// of Voronoi cells, which are as large as triangles' edges are long.
+/// The lengths of triangles' edges, or the distances between the sites of neighbouring Voronoi cells, which compare with
+/// them, of samples with sides `step`.
 fn edge_lengths(cells: &FlowCells<2>, step: &Point<2>) -> Vec<f64> {
     let length = |a: &Point<2>, b: &Point<2>| {
         let way = difference(a, b);

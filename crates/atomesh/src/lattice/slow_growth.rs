@@ -1,16 +1,18 @@
-//! Growth's slow twin: algorithm 2 as it is written, each site tried against every atom there is.
+//! The slow reference for growth: algorithm 2 as it is written, each site tried against every atom there is.
 
 use rand::{RngExt, SeedableRng};
 use rand_pcg::Pcg64;
 
-use super::grow::{Boundary, GrowOptions, Place, grow, restart_room};
+use super::boundary::{Boundary, Place};
+use super::grow::{GrowOptions, grow};
+use super::occupancy::restart_room;
 use super::{Crystal, Lattice};
 use crate::fields::NominalDistance;
-use crate::geometry::{Bounds, Point, distance_squared};
+use crate::geometry::{Bounds, Point, all_axes, distance_squared};
 use crate::image::Grid;
 use crate::watch::Silent;
 
-struct Twin<'a, const D: usize> {
+struct SlowGrowth<'a, const D: usize> {
     lattice: Lattice<D>,
     distance: &'a NominalDistance<D>,
     gamma: f64,
@@ -19,7 +21,7 @@ struct Twin<'a, const D: usize> {
     hidden: Vec<bool>,
 }
 
-impl<const D: usize> Twin<'_, D> {
+impl<const D: usize> SlowGrowth<'_, D> {
     fn try_site(&mut self, p: Point<D>, room: f64, freedom: u8) {
         let d = self.distance.at(&p);
         let free = self.lattice.atoms.iter().zip(&self.hidden).all(|(q, &hidden)| {
@@ -60,11 +62,11 @@ impl<const D: usize> Twin<'_, D> {
     }
 
     fn centre(&self) -> Point<D> {
-        let Bounds { min, max } = self.lattice.bounds;
-        std::array::from_fn(|k| (0.5 * (min[k] + max[k]) / self.quantum).round() * self.quantum)
+        self.lattice.bounds.centre().map(|x| (x / self.quantum).round() * self.quantum)
     }
 
-    fn face(&mut self, normal: usize, level: f64, seeds: usize) {
+    fn face(&mut self, side: usize, seeds: usize) {
+        let (normal, level) = (side / 2, self.lattice.bounds.level(side));
         let axes: Vec<usize> = (0..D).filter(|&k| k != normal).collect();
         let steps: Vec<Point<D>> = (Crystal::hexagonal().neighbors().iter())
             .map(|v| {
@@ -78,7 +80,7 @@ impl<const D: usize> Twin<'_, D> {
         let first = self.lattice.len();
         let mut centre = self.centre();
         centre[normal] = level;
-        let freedom = axes.iter().map(|k| 1u8 << k).sum();
+        let freedom = all_axes::<D>() & !(1 << normal);
         self.try_site(centre, self.gamma, freedom);
         self.fill(first, &on_face, &steps, freedom);
         self.hidden.fill(false);
@@ -97,21 +99,20 @@ fn grown_slowly<const D: usize>(
     let seeds = lattice.atoms.iter().take_while(|p| options.seed_points.contains(p)).count();
     let hidden = vec![false; lattice.len()];
     let gamma = options.spacing_factor;
-    let mut twin = Twin { lattice, distance, gamma, quantum, hidden };
-    for normal in 0..if D == 3 { 3 } else { 0 } {
-        twin.face(normal, bounds.min[normal], seeds);
-        twin.face(normal, bounds.max[normal], seeds);
+    let mut growth = SlowGrowth { lattice, distance, gamma, quantum, hidden };
+    for side in 0..if D == 3 { 6 } else { 0 } {
+        growth.face(side, seeds);
     }
-    let (first, all) = (twin.lattice.len(), ((1usize << D) - 1) as u8);
+    let (first, all) = (growth.lattice.len(), all_axes::<D>());
     for s in 0..seeds {
-        twin.surround(s, crystal.neighbors(), gamma, all);
+        growth.surround(s, crystal.neighbors(), gamma, all);
     }
-    if twin.lattice.len() == first {
-        twin.try_site(twin.centre(), gamma, all);
+    if growth.lattice.len() == first {
+        growth.try_site(growth.centre(), gamma, all);
     }
     let rim: Vec<usize> = (0..first).collect();
-    twin.fill(first, &rim, crystal.neighbors(), all);
-    twin.lattice
+    growth.fill(first, &rim, crystal.neighbors(), all);
+    growth.lattice
 }
 
 /// d of one value, of a gentle slope, of steep bumps whose slope is limited to 0.45.
@@ -129,7 +130,7 @@ fn distance<const D: usize>(grid: &Grid<D>, kind: usize, random: &mut Pcg64) -> 
     NominalDistance::from_field(grid, &field, 0.45).unwrap()
 }
 
-fn the_twin_grows_the_same<const D: usize>(crystals: &[Crystal<D>], longest: usize) {
+fn fast_equals_slow<const D: usize>(crystals: &[Crystal<D>], longest: usize) {
     for seed in 0..24 {
         let mut random = Pcg64::seed_from_u64(seed);
         // thin boxes too
@@ -152,7 +153,7 @@ fn the_twin_grows_the_same<const D: usize>(crystals: &[Crystal<D>], longest: usi
 }
 
 #[test]
-fn growth_and_its_slow_twin_make_the_same_lattice_to_the_bit() {
-    the_twin_grows_the_same(&[Crystal::hexagonal()], 90);
-    the_twin_grows_the_same(&[Crystal::body_centered_cubic(), Crystal::face_centered_cubic()], 26);
+fn fast_and_slow_growth_make_the_same_lattice_to_the_bit() {
+    fast_equals_slow(&[Crystal::hexagonal()], 90);
+    fast_equals_slow(&[Crystal::body_centered_cubic(), Crystal::face_centered_cubic()], 26);
 }

@@ -1,31 +1,38 @@
-//! A triangular mesh over its image.
+//! Triangles or polygons over their image.
 
-use atomesh::geometry::{Point, difference, dot};
+use atomesh::geometry::{Point, difference};
 use atomesh::image::Image;
 use atomesh::mesh::{Mesh, PolyMesh};
 
-use crate::picture::{Picture, Place, Rect, Shape};
+use crate::error::DrawError;
+use crate::picture::Picture;
 use crate::raster::Ramp;
-use crate::{DrawError, Style};
+use crate::scale::{EDGE_SAMPLES, median, scale, typical_length};
+use crate::shape::{Place, Rect, Shape};
+use crate::style::Style;
 
 /// Draws a mesh over an image, as in figure 2 of Hale (2001): greys from black at the least to
-/// [`Style::brightness`] at the greatest sample, edges and, if wanted, atoms on top.
+/// [`Style::brightness`] at the greatest sample, with edges and, optionally, atoms on top.
 ///
 /// The image may be any field on the grid: the image itself, b, or d as in figure 5. The mesh is in
 /// sample coordinates. Cost: O(pixels + samples + cells log cells).
 ///
 /// # Errors
-/// [`DrawError::Style`] if a number of the style has no meaning.
-pub fn draw_flat(image: &Image<2>, mesh: &Mesh<2>, style: &Style) -> Result<Picture, DrawError> {
+/// [`DrawError::Style`] if a number of the style is out of range.
+pub fn draw_triangles(
+    image: &Image<2>,
+    mesh: &Mesh<2>,
+    style: &Style,
+) -> Result<Picture, DrawError> {
     let edge = typical_length(mesh, &image.frame().grid(style.units).step);
     let lines = Net { points: mesh.points(), edges: edges(mesh), atoms: mesh.points(), edge };
     draw(image, &lines, style)
 }
 
-/// Draws polygons over an image, their sites as atoms; otherwise as [`draw_flat`].
+/// Draws polygons over an image, their sites as atoms; otherwise as [`draw_triangles`].
 ///
 /// # Errors
-/// As [`draw_flat`].
+/// As [`draw_triangles`].
 pub fn draw_polygons(
     image: &Image<2>,
     mesh: &PolyMesh<2>,
@@ -38,8 +45,9 @@ pub fn draw_polygons(
         let edge = difference(&mesh.points()[e[1] as usize], &mesh.points()[e[0] as usize]);
         (edge[0] * step[0]).hypot(edge[1] * step[1])
     };
-    let edge =
-        median(edges.iter().step_by(edges.len().div_ceil(LOOKS).max(1)).map(length).collect());
+    let edge = median(
+        edges.iter().step_by(edges.len().div_ceil(EDGE_SAMPLES).max(1)).map(length).collect(),
+    );
     draw(image, &Net { points: mesh.points(), edges, atoms: mesh.centers(), edge }, style)
 }
 
@@ -91,40 +99,4 @@ fn edges<const D: usize>(mesh: &Mesh<D>) -> Vec<[u32; 2]> {
     edges.sort_unstable();
     edges.dedup();
     edges
-}
-
-/// Cells looked at to find the typical length of edges.
-pub(crate) const LOOKS: usize = 1 << 14;
-
-/// The median length of the edges of cells spread over the mesh, of samples with sides `step`; `None`
-/// without cells.
-pub(crate) fn typical_length<const D: usize>(mesh: &Mesh<D>, step: &[f64; D]) -> Option<f64> {
-    let points = mesh.points();
-    let mut lengths = Vec::new();
-    for cell in mesh.cells().step_by(mesh.cell_count().div_ceil(LOOKS).max(1)) {
-        for (i, &a) in cell.iter().enumerate() {
-            for &b in &cell[i + 1..] {
-                let edge = difference(&points[b as usize], &points[a as usize]);
-                let edge: Point<D> = std::array::from_fn(|k| edge[k] * step[k]);
-                lengths.push(dot(&edge, &edge).sqrt());
-            }
-        }
-    }
-    median(lengths)
-}
-
-/// The middle one; `None` of none.
-pub(crate) fn median(mut lengths: Vec<f64>) -> Option<f64> {
-    let middle = lengths.len() / 2;
-    (!lengths.is_empty()).then(|| *lengths.select_nth_unstable_by(middle, f64::total_cmp).1)
-}
-
-/// Pixels to a unit of length, so that an edge of the given length is as long as the style wants it,
-/// or else the picture of that extent as large as it may be.
-pub(crate) fn scale(edge: Option<f64>, extent: &[f64; 2], style: &Style) -> f64 {
-    let largest = style.max_side / extent[0].max(extent[1]);
-    match edge {
-        Some(edge) if edge > 0.0 => largest.min(style.edge_pixels / edge),
-        _ => largest,
-    }
 }
