@@ -1,9 +1,8 @@
 //! What differs between flat images and volumes, as values.
 
 use atomesh::image::Image;
-use atomesh::mesh::Mesh;
+use atomesh::mesh::{Mesh, PolyMesh};
 use atomesh::run::Method;
-use atomesh::voronoi::PolyMesh;
 use atomesh_draw::{
     DrawError, FlowPicture, FlowStyle, Picture, Style, draw_flat, draw_flow, draw_flow_slices,
     draw_polygons, draw_polyhedra, draw_slices,
@@ -32,7 +31,7 @@ impl Dimension<2> {
     /// Images of two axes.
     pub fn flat() -> Self {
         Self {
-            method: Method::flat(),
+            method: Method::plane(),
             draw: draw_flat,
             draw_cells: draw_polygons,
             draw_flow: |flow, style, flow_style| draw_flow(flow, style, flow_style),
@@ -50,7 +49,7 @@ impl Dimension<3> {
     /// Images of three axes; pictures show the three slices through the middle.
     pub fn volume() -> Self {
         Self {
-            method: Method::volume(),
+            method: Method::space(),
             draw: |image, mesh, style| {
                 let style = Style { atoms: true, ..style.clone() };
                 draw_slices(image, mesh, image.frame().shape().map(|n| n / 2), &style)

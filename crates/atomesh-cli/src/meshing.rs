@@ -56,13 +56,13 @@ impl Meshing<'_> {
     ///
     /// # Errors
     /// [`Failure`] if a file cannot be used, or options make no sense.
-    pub fn prepare<'m, const D: usize>(
+    pub fn prepare<const D: usize>(
         &self,
         image: Image<D>,
-        dimension: &'m Dimension<D>,
+        dimension: &Dimension<D>,
         keep_image: bool,
         watch: &mut Progress,
-    ) -> Result<(Prepared<'m, D>, Option<Image<D>>), Failure> {
+    ) -> Result<(Prepared<D>, Option<Image<D>>), Failure> {
         let image = self.run.frame.place(image).map_err(|f| f.about(self.path))?;
         let mut options = self.run.mesh_options::<D>()?;
         options.memory_limit = memory::available();

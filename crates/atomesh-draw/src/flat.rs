@@ -2,8 +2,7 @@
 
 use atomesh::geometry::{Point, difference, dot};
 use atomesh::image::Image;
-use atomesh::mesh::Mesh;
-use atomesh::voronoi::PolyMesh;
+use atomesh::mesh::{Mesh, PolyMesh};
 
 use crate::picture::{Picture, Place, Rect, Shape};
 use crate::raster::Ramp;
@@ -32,7 +31,8 @@ pub fn draw_polygons(
     mesh: &PolyMesh<2>,
     style: &Style,
 ) -> Result<Picture, DrawError> {
-    let edges: Vec<[u32; 2]> = (0..mesh.face_count()).flat_map(|face| mesh.parts(face)).collect();
+    let edges: Vec<[u32; 2]> =
+        (0..mesh.face_count()).flat_map(|face| mesh.face_parts(face)).collect();
     let step = image.frame().grid(style.units).step;
     let length = |e: &[u32; 2]| {
         let edge = difference(&mesh.points()[e[1] as usize], &mesh.points()[e[0] as usize]);
@@ -40,7 +40,7 @@ pub fn draw_polygons(
     };
     let edge =
         median(edges.iter().step_by(edges.len().div_ceil(LOOKS).max(1)).map(length).collect());
-    draw(image, &Net { points: mesh.points(), edges, atoms: mesh.sites(), edge }, style)
+    draw(image, &Net { points: mesh.points(), edges, atoms: mesh.centers(), edge }, style)
 }
 
 /// What is drawn over an image.

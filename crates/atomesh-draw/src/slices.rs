@@ -2,8 +2,7 @@
 
 use atomesh::geometry::Point;
 use atomesh::image::Image;
-use atomesh::mesh::Mesh;
-use atomesh::voronoi::PolyMesh;
+use atomesh::mesh::{Mesh, PolyMesh};
 
 use crate::flat::{LOOKS, median, scale, typical_length};
 use crate::label::label;
@@ -261,7 +260,7 @@ impl Sliced for PolyMesh<3> {
     }
 
     fn atoms(&self) -> &[Point<3>] {
-        self.sites()
+        self.centers()
     }
 
     /// From site to site: cells are as large as tetrahedra's edges are long.
@@ -269,7 +268,7 @@ impl Sliced for PolyMesh<3> {
         let faces = (0..self.inner_face_count()).step_by(self.face_count().div_ceil(LOOKS).max(1));
         let length = |face: usize| {
             let [a, b] = [self.owners()[face], self.neighbours()[face]];
-            let [a, b] = [a, b].map(|cell| self.sites()[cell as usize]);
+            let [a, b] = [a, b].map(|cell| self.centers()[cell as usize]);
             (0..3).map(|k| ((b[k] - a[k]) * step[k]).powi(2)).sum::<f64>().sqrt()
         };
         median(faces.map(length).collect())

@@ -2,8 +2,8 @@
 
 use atomesh::geometry::{Bounds, Point};
 use atomesh::image::{Frame, Image, Samples};
-use atomesh::mesh::{Delaunay, Mesh};
-use atomesh::voronoi::{PolyMesh, voronoi};
+use atomesh::mesh::{Delaunay, Mesh, PolyMesh};
+use atomesh::voronoi::voronoi;
 use atomesh::watch::Silent;
 use atomesh_draw::{
     DrawError, FlowCells, FlowLine, FlowPicture, FlowStyle, FlowWell, Picture, PictureFormat,

@@ -1,9 +1,8 @@
 //! Cells and the facets between them: what both schemes know of a mesh.
 
-use atomesh::features::FeatureSet;
+use atomesh::features::FeatureFaces;
 use atomesh::geometry::{Point, difference, dot};
-use atomesh::mesh::{Mesh, Tags};
-use atomesh::voronoi::{FeatureFaces, PolyMesh, side_name};
+use atomesh::mesh::{Mesh, PolyMesh, Tags, feature_name, side_name};
 
 use crate::problem::Value;
 
@@ -115,7 +114,7 @@ impl<const D: usize> Grid<D> {
             .collect();
         if let Some(features) = features {
             let first = sets.len();
-            let names = (0..features.areas.len()).map(FeatureSet::<D>::name);
+            let names = (1..=features.areas.len() as u32).map(feature_name);
             sets.extend(names.map(|name| FacetSet { name, facets: Vec::new() }));
             for (face, &number) in features.of_faces.iter().enumerate().filter(|(_, n)| **n > 0) {
                 sets[first + number as usize - 1].facets.push(face as u32);
@@ -204,7 +203,7 @@ impl<const D: usize> Grid<D> {
         match &self.shape {
             Shape::Simplices(mesh) => simplices_at(mesh, place),
             Shape::Cells(mesh) => {
-                let sites = mesh.sites();
+                let sites = mesh.centers();
                 let away = |site: &Point<D>| {
                     let way = difference(site, place);
                     dot(&way, &way)
@@ -225,7 +224,7 @@ impl<const D: usize> Grid<D> {
 
     /// The sites of Voronoi cells; `None` for triangles and tetrahedra.
     pub fn sites(&self) -> Option<&[Point<D>]> {
-        self.cells().map(PolyMesh::sites)
+        self.cells().map(PolyMesh::centers)
     }
 
     /// The mesh of triangles or tetrahedra; `None` for Voronoi cells.

@@ -47,7 +47,7 @@ fn drawn() -> Image<2> {
 /// The mesh of the image, with the facets that follow its dark lines.
 fn followed(image: &Image<2>, size: f64) -> (Mesh<2>, Tags<2>) {
     let options = MeshOptions { size: Size::Constant(size), ..Default::default() };
-    let method = Method::flat();
+    let method = Method::plane();
     let prepared = prepare(&method, Inputs::image(image), options, &mut Silent).unwrap();
     let outcome = prepared.run(&mut Silent).unwrap();
     let mesh = outcome.world_mesh();

@@ -2,10 +2,11 @@
 
 use std::path::Path;
 
+use atomesh::features::FeatureFaces;
 use atomesh::geometry::Point;
 use atomesh::image::{Frame, Units};
-use atomesh::mesh::Delaunay;
-use atomesh::voronoi::{FeatureFaces, PolyMesh, connections, voronoi};
+use atomesh::mesh::{Delaunay, PolyMesh, connections};
+use atomesh::voronoi::voronoi;
 use atomesh::watch::Silent;
 use atomesh_io::atomic_file::AtomicFile;
 use atomesh_io::mesh::Provenance;
@@ -212,7 +213,7 @@ fn a_layer_of_polygons_has_the_areas_of_the_cells_and_runs_clockwise() {
         .map(|row| [row[1].parse().unwrap(), row[2].parse().unwrap()])
         .collect();
     for (row, (area, site)) in
-        block(&disv, "CELL2D").iter().zip(mesh.measures().iter().zip(mesh.sites()))
+        block(&disv, "CELL2D").iter().zip(mesh.measures().iter().zip(mesh.centers()))
     {
         assert_eq!([row[1].parse::<f64>().unwrap(), row[2].parse().unwrap()], *site);
         let at = |n: usize| points[row[4 + n % (row.len() - 4)].parse::<usize>().unwrap() - 1];

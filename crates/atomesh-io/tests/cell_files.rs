@@ -4,10 +4,11 @@ use std::collections::HashMap;
 use std::fs;
 use std::io::{Cursor, Read};
 
+use atomesh::features::FeatureFaces;
 use atomesh::geometry::{Bounds, Point};
 use atomesh::image::Frame;
-use atomesh::mesh::Delaunay;
-use atomesh::voronoi::{FeatureFaces, PolyMesh, voronoi};
+use atomesh::mesh::{Delaunay, PolyMesh};
+use atomesh::voronoi::voronoi;
 use atomesh::watch::Silent;
 use atomesh_io::mesh::Provenance;
 use atomesh_io::mesh::cells::{CellData, ConnectionFiles, poly_mesh_of, write_connections};

@@ -1,9 +1,10 @@
 //! Files of flow: velocities and pressures in VTU, fluxes as a table.
 
+use atomesh::features::FeatureFaces;
 use atomesh::geometry::Bounds;
 use atomesh::image::Frame;
 use atomesh::mesh::{Delaunay, Mesh, Quadratic};
-use atomesh::voronoi::{FeatureFaces, voronoi};
+use atomesh::voronoi::voronoi;
 use atomesh::watch::Silent;
 use atomesh_io::mesh::cells::CellData;
 use atomesh_io::mesh::vtu::{write_broken_vtu, write_cells_vtu, write_cells_vtu_with};

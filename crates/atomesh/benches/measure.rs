@@ -2,7 +2,9 @@
 
 use atomesh::geometry::Point;
 use atomesh::image::{Frame, Samples};
-use atomesh::measure::{AlignmentOptions, alignment, features, fidelity, shape, shapes};
+use atomesh::measure::{
+    AlignmentOptions, SampledPotential, alignment, features, fidelity, shape, shapes,
+};
 use atomesh::mesh::Mesh;
 use atomesh::sample::{SampleOptions, Statistic, sample_placed};
 use atomesh::watch::Silent;
@@ -55,10 +57,11 @@ fn measures(criterion: &mut Criterion) {
     let side = (SIDE - 1) * STEP as usize;
     let potential = valleys(side);
     group.throughput(Throughput::Elements(potential.len() as u64));
+    let sampled = SampledPotential { values: &potential, shape: [side; 3] };
     group.bench_function("features", |b| {
-        b.iter(|| features(&potential, [side; 3], STEP, &mut Silent));
+        b.iter(|| features(sampled, STEP, &mut Silent));
     });
-    let Ok(found) = features(&potential, [side; 3], STEP, &mut Silent) else { return };
+    let Ok(found) = features(sampled, STEP, &mut Silent) else { return };
     let options = AlignmentOptions::new(STEP);
     group.bench_function("alignment", |b| {
         b.iter(|| alignment(&mesh, &found, &options, &mut Silent));
@@ -68,7 +71,7 @@ fn measures(criterion: &mut Criterion) {
     let image = Samples::F32(potential);
     group.bench_function("sample", |b| {
         let options = SampleOptions::new(&[Statistic::Mean, Statistic::Total]);
-        b.iter(|| sample_placed(&mesh, (&frame, &image), options, &mut Silent));
+        b.iter(|| sample_placed(&mesh, &frame, &image, options, &mut Silent));
     });
     group.bench_function("fidelity", |b| {
         b.iter(|| fidelity(&mesh, (&frame, &image), &mut Silent));

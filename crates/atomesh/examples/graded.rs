@@ -11,7 +11,7 @@ fn main() -> Result<(), Box<dyn std::error::Error>> {
 
     for size in [Size::Constant(4.0), Size::Range { min: 4.0, max: 16.0 }, Size::Constant(16.0)] {
         let options = MeshOptions { size, ..Default::default() };
-        let method = Method::flat();
+        let method = Method::plane();
         let outcome = prepare(&method, Inputs::image(&faults.image), options, &mut Silent)?
             .run(&mut Silent)?;
         let d = outcome.distance();

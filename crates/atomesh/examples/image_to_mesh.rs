@@ -10,7 +10,7 @@ fn main() -> Result<(), Box<dyn std::error::Error>> {
     let faults = synthesize(Scene::Faults, &SynthOptions::new([128, 128]))?;
 
     let options = MeshOptions { size: Size::Constant(8.0), ..Default::default() };
-    let method = Method::flat();
+    let method = Method::plane();
     let outcome =
         prepare(&method, Inputs::image(&faults.image), options, &mut Silent)?.run(&mut Silent)?;
 

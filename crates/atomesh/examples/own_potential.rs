@@ -18,7 +18,7 @@ fn main() -> Result<(), Box<dyn std::error::Error>> {
 
     let inputs = Inputs { is_potential: true, ..Inputs::image(&image) };
     let options = MeshOptions { size: Size::Constant(6.0), ..Default::default() };
-    let outcome = prepare(&Method::flat(), inputs, options, &mut Silent)?.run(&mut Silent)?;
+    let outcome = prepare(&Method::plane(), inputs, options, &mut Silent)?.run(&mut Silent)?;
 
     let b = outcome.potential_at_points();
     let on_circle = b.iter().filter(|b| **b < -0.8).count();

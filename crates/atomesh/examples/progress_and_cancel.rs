@@ -32,7 +32,7 @@ impl Watch for Patience {
 
 fn main() -> Result<(), Box<dyn std::error::Error>> {
     let faults = synthesize(Scene::Faults, &SynthOptions::new([96, 96]))?;
-    let method = Method::flat();
+    let method = Method::plane();
     let mut watch = Patience { last: None, steps_left: 3 };
     let run = prepare(&method, Inputs::image(&faults.image), MeshOptions::default(), &mut watch)
         .and_then(|prepared| prepared.run(&mut watch));

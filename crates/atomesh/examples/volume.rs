@@ -17,7 +17,7 @@ fn main() -> Result<(), Box<dyn std::error::Error>> {
         size: Size::Constant(3.0), // millimetres along every axis, whatever the samples are
         ..Default::default()
     };
-    let method = Method::volume();
+    let method = Method::space();
     let prepared = prepare(&method, Inputs::image(&sphere.image), options, &mut Silent)?;
     println!("expected: about {} points", prepared.estimate().atoms);
 

@@ -115,7 +115,7 @@ fn farthest<const D: usize>(outcome: &Outcome<D>, centre: &Point<D>, radii: &[f6
 fn a_disc_has_a_smooth_outline_and_its_area() {
     let (centre, radius, d) = ([70.0, 60.0], 40.0, 8.0);
     let mask = image([160, 128], |p| u8::from(distance(p, &centre) < radius));
-    let outcome = masked(&Method::flat(), &mask, d);
+    let outcome = masked(&Method::plane(), &mask, d);
     // the staircase's area differs from the disc's by a few tenths of a percent
     check(&outcome, PI * radius * radius, 0.01, 25.0);
     // half of the sag d²/8R of a chord is 0.1; samples place the outline to about a third of one
@@ -130,7 +130,7 @@ fn parts_and_holes_stay() {
         let r = distance(p, &centre);
         255 * u8::from((20.0..45.0).contains(&r) || distance(p, &other) < 12.0)
     });
-    let outcome = masked(&Method::flat(), &mask, 6.0);
+    let outcome = masked(&Method::plane(), &mask, 6.0);
     check(&outcome, PI * (45.0 * 45.0 - 20.0 * 20.0 + 12.0 * 12.0), 0.01, 20.0);
     // three closed lines
     let boundary = boundary(outcome.mesh());
@@ -147,7 +147,7 @@ fn parts_and_holes_stay() {
 fn a_mask_at_the_sides_keeps_them() {
     let centre = [0.0, 60.0];
     let mask = image([160, 128], |p| u8::from(distance(p, &centre) < 40.0));
-    let outcome = masked(&Method::flat(), &mask, 8.0);
+    let outcome = masked(&Method::plane(), &mask, 8.0);
     check(&outcome, 0.5 * PI * 1600.0, 0.01, 20.0);
     let tags = outcome.tags().unwrap();
     let names: Vec<&str> = tags.facet_groups().iter().map(|g| g.name.as_str()).collect();
@@ -164,7 +164,7 @@ fn a_mask_at_the_sides_keeps_them() {
 fn a_ball_has_a_smooth_surface_and_its_volume() {
     let (centre, radius, d) = ([31.3, 32.0, 31.0], 24.0, 6.0);
     let mask = image([64; 3], |p| u8::from(distance(p, &centre) < radius));
-    let outcome = masked(&Method::volume(), &mask, d);
+    let outcome = masked(&Method::space(), &mask, d);
     check(&outcome, 4.0 / 3.0 * PI * radius.powi(3), 0.01, 5.0);
     assert_eq!(euler(&boundary(outcome.mesh())), 2);
     // the sag d²/6R is 0.25 before facets are fitted
@@ -175,7 +175,7 @@ fn a_ball_has_a_smooth_surface_and_its_volume() {
 fn half_a_shell_at_a_side_has_one_surface() {
     let centre = [31.3, 32.0, 0.0];
     let mask = image([64, 64, 32], |p| u8::from((12.0..26.0).contains(&distance(p, &centre))));
-    let outcome = masked(&Method::volume(), &mask, 6.0);
+    let outcome = masked(&Method::space(), &mask, 6.0);
     // the samples of the side reach half a step beyond it, so that the outline sits there as elsewhere
     check(&outcome, 2.0 / 3.0 * PI * (26.0_f64.powi(3) - 12.0_f64.powi(3)), 0.015, 0.2);
     assert_eq!(euler(&boundary(outcome.mesh())), 2);
@@ -188,11 +188,11 @@ fn thin_and_ragged_masks_have_manifold_boundaries() {
         let wave = (p[0] / 4.0).sin() + (p[1] / 3.1).sin() + (p[2] / 3.7).sin();
         u8::from(wave > 0.3)
     });
-    let outcome = masked(&Method::volume(), &mask, 5.0);
+    let outcome = masked(&Method::space(), &mask, 5.0);
     let boundary = boundary(outcome.mesh());
     assert!(ridges(&boundary).values().all(|&n| n == 2));
     let flat = image([96, 96], |p| u8::from((p[0] / 4.0).sin() * (p[1] / 3.1).sin() > 0.1));
-    let outcome = masked(&Method::flat(), &flat, 6.0);
+    let outcome = masked(&Method::plane(), &flat, 6.0);
     assert!(ridges(&self::boundary(outcome.mesh())).values().all(|&n| n == 2));
 }
 
@@ -201,7 +201,7 @@ fn shares_end_where_they_are_one_half() {
     // a ramp from 0 at x = 0 to 1 at x = 60
     let samples = (0..61 * 41).map(|i| (i % 61) as f32 / 60.0).collect();
     let mask = Image::new(Frame::new([61, 41]).unwrap(), Samples::F32(samples)).unwrap();
-    let outcome = masked(&Method::flat(), &mask, 6.0);
+    let outcome = masked(&Method::plane(), &mask, 6.0);
     for p in outcome.outline_facets().as_flattened() {
         let x = outcome.mesh().points()[*p as usize][0];
         // a mirrored ramp is bent at the sides of the box, a little
@@ -213,7 +213,7 @@ fn shares_end_where_they_are_one_half() {
 fn empty_and_tiny_masks_are_refused_and_full_ones_change_nothing() {
     let picture = image([64, 48], |_| 7);
     let mesh = |mask: &Image<2>| {
-        run(&Method::flat(), Inputs { mask: Some(mask), ..Inputs::image(&picture) }, options(6.0))
+        run(&Method::plane(), Inputs { mask: Some(mask), ..Inputs::image(&picture) }, options(6.0))
     };
     let region = |error| match error {
         RunError::Region(error) => error,
@@ -224,7 +224,7 @@ fn empty_and_tiny_masks_are_refused_and_full_ones_change_nothing() {
     let one = mesh(&image([64, 48], |p| u8::from(*p == [30.0, 20.0])));
     assert_eq!(region(one.unwrap_err()), RegionError::SmallMask { distance: 6.0 });
     let full = mesh(&image([64, 48], |_| 1)).unwrap();
-    let plain = run(&Method::flat(), Inputs::image(&picture), options(6.0)).unwrap();
+    let plain = run(&Method::plane(), Inputs::image(&picture), options(6.0)).unwrap();
     assert_eq!(full.mesh(), plain.mesh());
     let thin = mesh(&image([64, 40], |_| 1)).unwrap_err();
     assert!(thin.to_string().contains("mask"), "{thin}");
@@ -235,7 +235,7 @@ fn a_masked_mesh_is_the_same_at_any_number_of_threads() {
     let mask = image([40; 3], |p| u8::from(distance(p, &[20.0, 19.0, 18.0]) < 14.0));
     let run = |threads| {
         let pool = rayon::ThreadPoolBuilder::new().num_threads(threads).build().unwrap();
-        pool.install(|| masked(&Method::volume(), &mask, 6.0))
+        pool.install(|| masked(&Method::space(), &mask, 6.0))
     };
     assert_eq!(run(1).mesh(), run(3).mesh());
 }
@@ -246,7 +246,7 @@ fn cells_take_labels_and_interfaces_their_names() {
     let features = FeatureOptions { features: Features::Labels, ..Default::default() };
     let options = MeshOptions { features, least_island: 2, ..options(6.0) };
     let inputs = Inputs { labels: Some(&labels), ..Inputs::image(&labels) };
-    let outcome = run(&Method::flat(), inputs, options).unwrap();
+    let outcome = run(&Method::plane(), inputs, options).unwrap();
     let tags = outcome.tags().unwrap();
     let regions = tags.regions().unwrap();
     assert_eq!(regions.ids(), [2, 5]);
@@ -269,7 +269,7 @@ fn cells_take_labels_and_interfaces_their_names() {
 fn curved_cells_fit_a_disc_better_than_straight_ones() {
     let (centre, radius) = ([70.0, 60.0], 40.0);
     let mask = image([160, 128], |p| u8::from(distance(p, &centre) < radius));
-    let outcome = masked(&Method::flat(), &mask, 16.0);
+    let outcome = masked(&Method::plane(), &mask, 16.0);
     let quadratic = outcome.quadratic();
     let middles: Vec<f64> = (outcome.outline_facets().iter())
         .map(|&[a, b]| {

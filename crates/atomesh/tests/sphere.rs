@@ -56,7 +56,7 @@ fn a_sphere_is_far_nearer_to_the_truth_than_with_corners_on_it() {
             improve: ImproveOptions { align, ..ImproveOptions::for_dimension(3) },
             ..Default::default()
         };
-        let method = Method::volume();
+        let method = Method::space();
         let prepared = prepare(&method, Inputs::image(&drawn.image), options, &mut Silent).unwrap();
         prepared.run(&mut Silent).unwrap()
     };

@@ -2,7 +2,7 @@
 
 use std::path::{Path, PathBuf};
 
-use atomesh::voronoi::PolyMesh;
+use atomesh::mesh::PolyMesh;
 use atomesh_flow::two_point::transmissibilities;
 use atomesh_flow::{FlowError, Grid, Permeability, Problem, Setting};
 use atomesh_io::mesh::MeshWriteError;

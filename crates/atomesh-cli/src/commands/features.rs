@@ -5,11 +5,10 @@ use std::path::{Path, PathBuf};
 use atomesh::enhance::{EnhanceError, enhance, given_potential};
 use atomesh::features::{
     FacetField, FacetTest, FeatureFacetOptions, FeatureSet, FeaturesError, find_features,
-    is_feature_name,
 };
 use atomesh::fields::ScalarField;
 use atomesh::image::{Image, Units};
-use atomesh::mesh::Tags;
+use atomesh::mesh::{Tags, is_feature_name};
 use atomesh::run::{MeshOptions, lattice_mesh};
 use atomesh_io::image::AnyImage;
 use atomesh_io::mesh::{AnyMesh, LoadedMesh, MeshData, MeshFormat, MeshWriteError, write_mesh};

@@ -5,8 +5,8 @@ use std::path::{Path, PathBuf};
 use atomesh::image::Image;
 use atomesh::improve::ImproveReport;
 use atomesh::measure::{AlignmentReport, ShapeReport, shape};
+use atomesh::mesh::PolyReport;
 use atomesh::run::{MeshReport, Outcome, Prepared, RunError, VoronoiReport};
-use atomesh::voronoi::PolyReport;
 use atomesh_io::image::AnyImage;
 use serde_json::json;
 
@@ -348,7 +348,7 @@ fn summary<const D: usize>(
 const SECONDS_PER_ATOM: [f64; 2] = [5e-5, 1.2e-5];
 
 fn expectation<const D: usize>(
-    prepared: &Prepared<'_, D>,
+    prepared: &Prepared<D>,
     dimension: &Dimension<D>,
     is_voronoi: bool,
 ) -> String {

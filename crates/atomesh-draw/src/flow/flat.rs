@@ -159,7 +159,7 @@ fn edge_lengths(cells: &FlowCells<2>, step: &Point<2>) -> Vec<f64> {
             })
             .collect(),
         FlowCells::Polytopes(mesh) => (mesh.owners().iter().zip(mesh.neighbours()))
-            .map(|(&a, &b)| length(&mesh.sites()[a as usize], &mesh.sites()[b as usize]))
+            .map(|(&a, &b)| length(&mesh.centers()[a as usize], &mesh.centers()[b as usize]))
             .collect(),
     }
 }

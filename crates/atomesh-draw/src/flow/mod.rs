@@ -13,8 +13,7 @@ mod space;
 
 use atomesh::geometry::Point;
 use atomesh::image::Image;
-use atomesh::mesh::Mesh;
-use atomesh::voronoi::PolyMesh;
+use atomesh::mesh::{Mesh, PolyMesh};
 
 use crate::DrawError;
 

@@ -143,7 +143,7 @@ fn typical_edge(cells: &FlowCells<3>, step: &Point<3>) -> Option<f64> {
             let stride = mesh.inner_face_count().div_ceil(LOOKS).max(1);
             let pairs = mesh.owners().iter().zip(mesh.neighbours()).step_by(stride);
             let length = |(&a, &b): (&u32, &u32)| {
-                let way = difference(&mesh.sites()[a as usize], &mesh.sites()[b as usize]);
+                let way = difference(&mesh.centers()[a as usize], &mesh.centers()[b as usize]);
                 (0..3).map(|k| (way[k] * step[k]).powi(2)).sum::<f64>().sqrt()
             };
             median(pairs.map(length).collect())

@@ -5,7 +5,7 @@
 //! in the rest: exact where the velocity is constant, and balanced in each piece.
 
 use atomesh::geometry::{Point, Simplex, difference, dot};
-use atomesh::voronoi::PolyMesh;
+use atomesh::mesh::PolyMesh;
 
 use super::simplex::Corners;
 use crate::grid::Grid;
@@ -89,7 +89,7 @@ impl<'a, const D: usize> Field<'a, D> {
         let mut signs = Vec::new();
         for (face, sign) in mesh.faces_of(cell) {
             let start = pieces.len();
-            for corners in mesh.parts(face) {
+            for corners in mesh.face_parts(face) {
                 let others = corners.map(|corner| mesh.points()[corner as usize]);
                 let simplex = Simplex { first, others };
                 let mut numbers = [CENTROID; 4];

@@ -85,7 +85,7 @@ fn parts<const D: usize>(field: &Field<'_, D>, facet: u32) -> Vec<([u32; D], [Po
         let others = places(mesh.points(), corners);
         (corners, others, Simplex { first, others }.measure().abs())
     };
-    let mut parts: Vec<_> = mesh.parts(facet as usize).map(part).collect();
+    let mut parts: Vec<_> = mesh.face_parts(facet as usize).map(part).collect();
     let whole: f64 = parts.iter().map(|part| part.2).sum();
     parts.iter_mut().for_each(|part| part.2 = if whole > 0.0 { part.2 / whole } else { 0.0 });
     parts

@@ -2,8 +2,8 @@ use std::f64::consts::PI;
 use std::ops::ControlFlow;
 
 use atomesh::geometry::{Bounds, difference, distance_squared, dot};
-use atomesh::mesh::Delaunay;
-use atomesh::voronoi::{PolyMesh, voronoi};
+use atomesh::mesh::{Delaunay, PolyMesh};
+use atomesh::voronoi::voronoi;
 use atomesh::watch::Silent;
 use proptest::prelude::*;
 

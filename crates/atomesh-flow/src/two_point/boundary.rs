@@ -1,7 +1,7 @@
 //! What holds on the faces on sides of the box.
 
 use atomesh::geometry::{Point, difference, distance_squared};
-use atomesh::voronoi::{BoundaryConnection, PolyMesh, boundary_connections};
+use atomesh::mesh::{BoundaryConnection, PolyMesh, boundary_connections};
 
 use crate::grid::{Grid, facet_integral};
 use crate::problem::{Condition, Value};
@@ -42,7 +42,7 @@ pub(super) fn sides<const D: usize>(
     for (at, own) in boundary_connections(cells).iter().enumerate() {
         let face = inner + at;
         let cell = own.cell as usize;
-        let site = &cells.sites()[cell];
+        let site = &cells.centers()[cell];
         let width = cells.measures()[cell].powf(1.0 / D as f64);
         faces.push(match setting.condition(face) {
             None => Side::Inflow(0.0),
@@ -74,7 +74,7 @@ fn value_at_foot<const D: usize>(
     own: &BoundaryConnection<D>,
     value: &Value<'_, D>,
 ) -> f64 {
-    let site = &cells.sites()[own.cell as usize];
+    let site = &cells.centers()[own.cell as usize];
     let foot: Point<D> = std::array::from_fn(|k| site[k] + own.distance * own.normal[k]);
     let way = difference(&foot, &own.centroid);
     let away = distance_squared(&foot, &own.centroid).sqrt();

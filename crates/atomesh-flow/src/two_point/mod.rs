@@ -24,7 +24,7 @@ mod well;
 pub use transmissibility::transmissibilities;
 pub use well::{RINGS, equivalent_radius};
 
-use atomesh::voronoi::PolyMesh;
+use atomesh::mesh::PolyMesh;
 use atomesh::watch::{Phase, Watch, check};
 
 use crate::error::FlowError;
@@ -58,6 +58,6 @@ pub fn solve<const D: usize>(
     let sides = boundary::sides(cells, grid, setting);
     let wells = well::couple(cells, setting)?;
     let equations = equations::Equations::new(grid, setting, inner, sides, wells);
-    let (pressures, report) = equations.solve(cells.sites(), options, watch)?;
+    let (pressures, report) = equations.solve(cells.centers(), options, watch)?;
     Ok(equations.solution(pressures, report))
 }

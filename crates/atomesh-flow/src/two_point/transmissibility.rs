@@ -1,6 +1,6 @@
 //! How much flows between two cells for a unit of difference between their pressures.
 
-use atomesh::voronoi::{Connection, PolyMesh, connections};
+use atomesh::mesh::{Connection, PolyMesh, connections};
 
 use crate::error::FlowError;
 use crate::permeability::Permeability;
@@ -49,6 +49,6 @@ pub fn transmissibilities<const D: usize>(
 
 /// The distance between the sites of two cells.
 fn apart<const D: usize>(cells: &PolyMesh<D>, own: &Connection<D>) -> f64 {
-    let [a, b] = own.cells.map(|cell| &cells.sites()[cell as usize]);
+    let [a, b] = own.cells.map(|cell| &cells.centers()[cell as usize]);
     atomesh::geometry::distance_squared(a, b).sqrt()
 }

@@ -3,7 +3,7 @@
 use std::f64::consts::TAU;
 
 use atomesh::geometry::{Point, difference, distance_squared, dot};
-use atomesh::voronoi::PolyMesh;
+use atomesh::mesh::PolyMesh;
 use atomesh::watch::Silent;
 
 use crate::error::FlowError;
@@ -118,7 +118,7 @@ impl<'a, const D: usize> Around<'a, D> {
             }
             unknown_count = end;
         }
-        Self { cells, site: cells.sites()[cell], found, unknown_count }
+        Self { cells, site: cells.centers()[cell], found, unknown_count }
     }
 
     /// The share of the whole angle that the well sees of the box: 1, or 1/2 from a side of it.
@@ -140,7 +140,7 @@ impl<'a, const D: usize> Around<'a, D> {
     fn pressure(&self) -> Result<f64, FlowError> {
         let (entries, rhs) = self.equations();
         let count = self.unknown_count;
-        let site = |&cell: &u32| self.cells.sites()[cell as usize];
+        let site = |&cell: &u32| self.cells.centers()[cell as usize];
         let places: Vec<Point<D>> = self.found[..count].iter().map(site).collect();
         let system = System {
             matrix: &Sparse::from_entries(count, count, &entries),
@@ -184,13 +184,13 @@ impl<'a, const D: usize> Around<'a, D> {
 
     fn transmissibility(&self, face: usize, pair: [u32; 2]) -> f64 {
         let area = self.cells.area_vector(face);
-        let [a, b] = pair.map(|cell| &self.cells.sites()[cell as usize]);
+        let [a, b] = pair.map(|cell| &self.cells.centers()[cell as usize]);
         (dot(&area, &area) / distance_squared(a, b)).sqrt()
     }
 
     /// The pressure of the well at a site.
     fn field(&self, cell: u32) -> f64 {
-        let squared = distance_squared(&self.site, &self.cells.sites()[cell as usize]);
+        let squared = distance_squared(&self.site, &self.cells.centers()[cell as usize]);
         match D {
             2 => -0.5 * squared.ln() / TAU,
             _ => 0.5 / (TAU * squared.sqrt()),
@@ -208,7 +208,8 @@ impl<'a, const D: usize> Around<'a, D> {
         if height.abs() <= ON_FACE * width * length {
             return 0.0;
         }
-        let angle: f64 = self.cells.simplices(face).map(|part| view_angle(&part, &self.site)).sum();
+        let angle: f64 =
+            self.cells.face_simplices(face).map(|part| view_angle(&part, &self.site)).sum();
         height.signum() * angle / if D == 2 { 1.0 } else { 2.0 } / TAU
     }
 }

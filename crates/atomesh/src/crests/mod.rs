@@ -1,5 +1,26 @@
 //! Points on the features of an image: where they are, between samples, and how they are turned.
+//!
+//! A feature is a line in the plane and a sheet in space; a [`FeaturePoint`] is one place on it. They come from
+//!
+//! - the bottoms of the valleys of b ([`bottoms`]), which facets should follow, and its crests where it repels
+//!   ([`repelling_crests`]);
+//! - raw images, by the finders of [`crate::enhance`].
+//!
+//! Points are linked into groups, the small and weak of which are left out ([`linked`], [`in_large_groups`]).
+//! Groups become a potential again ([`widen`]) or evenly spaced sites for atoms ([`sites`]).
 
+mod bins;
+mod groups;
+mod point;
+mod repelling;
+mod sites;
 mod valley;
+mod widen;
 
-pub use valley::{Bottom, Search, bottoms, in_large_groups};
+pub(crate) use bins::Bins;
+pub use groups::{Hysteresis, in_large_groups, linked, strongest};
+pub use point::FeaturePoint;
+pub use repelling::repelling_crests;
+pub(crate) use sites::{nearest_sites, sites};
+pub use valley::{ValleySearch, bottoms};
+pub(crate) use widen::widen;

@@ -7,8 +7,8 @@
 //!
 //! Cost: O(σ) per sample, and what the visitor does. Memory: a few planes a thread, and the crests.
 
-use super::crest::Crest;
 use super::quantile::{Order, Ranks};
+use crate::crests::FeaturePoint;
 use crate::image::{Grid, Run, Stencil, Stream, coordinates};
 use crate::watch::{Cancelled, Phase, Watch, check};
 use rayon::prelude::*;
@@ -85,9 +85,9 @@ pub(super) fn crossings<const D: usize>(
     fill: impl Fn(usize, &mut [f32]) + Sync,
     grid: &Grid<D>,
     sigma: f64,
-    visit: impl Fn(&Row<D>, &mut Vec<Crest<D>>) + Sync,
+    visit: impl Fn(&Row<D>, &mut Vec<FeaturePoint<D>>) + Sync,
     watch: &mut dyn Watch,
-) -> Result<Vec<Crest<D>>, Cancelled> {
+) -> Result<Vec<FeaturePoint<D>>, Cancelled> {
     let stream = Stream::new(fill, grid, Stencil::Gaussian(sigma)).with_smoothed();
     let planes = grid.shape[D - 1];
     let fair = planes.div_ceil(2 * rayon::current_num_threads());
@@ -112,8 +112,8 @@ pub(super) fn crossings<const D: usize>(
 /// Scales strengths so that all but a few of the strongest crests are within 0…1, and clips these to 1.
 ///
 /// Returns what a strength of 1 was before.
-pub(super) fn scale_strengths<const D: usize>(crests: &mut [Crest<D>]) -> f32 {
-    let strengths: Vec<f32> = crests.iter().map(|crest| crest.strength.max(0.0)).collect();
+pub(super) fn scale_strengths<const D: usize>(crests: &mut [FeaturePoint<D>]) -> f32 {
+    let strengths: Vec<f32> = crests.iter().map(|crest| (crest.strength as f32).max(0.0)).collect();
     let count = strengths.len();
     let order = Order::new(count, |start, out: &mut [f32]| {
         out.copy_from_slice(&strengths[start..start + out.len()]);
@@ -121,9 +121,9 @@ pub(super) fn scale_strengths<const D: usize>(crests: &mut [Crest<D>]) -> f32 {
     let clipped = (CLIPPED * count as f64) as usize;
     let full = order.ranked(count.saturating_sub(1 + clipped)).value;
     if full > 0.0 {
-        crests
-            .iter_mut()
-            .for_each(|crest| crest.strength = (crest.strength / full).clamp(0.0, 1.0));
+        for crest in crests {
+            crest.strength = (crest.strength as f32 / full).clamp(0.0, 1.0).into();
+        }
     }
     full
 }
@@ -141,7 +141,7 @@ struct Window<const D: usize> {
     first: usize,
     planes: VecDeque<Fields<D>>,
     spare: Vec<Fields<D>>,
-    crests: Vec<Crest<D>>,
+    crests: Vec<FeaturePoint<D>>,
 }
 
 impl<const D: usize> Window<D> {
@@ -152,7 +152,7 @@ impl<const D: usize> Window<D> {
     }
 
     /// Keeps a run, and visits the rows of the planes whose neighbours have come.
-    fn take(&mut self, run: &Run<D>, visit: &impl Fn(&Row<D>, &mut Vec<Crest<D>>)) {
+    fn take(&mut self, run: &Run<D>, visit: &impl Fn(&Row<D>, &mut Vec<FeaturePoint<D>>)) {
         let plane: usize = self.grid.shape[..D - 1].iter().product();
         while self.first + self.planes.len() <= run.plane {
             self.planes.push_back(self.spare.pop().unwrap_or_else(|| Fields {
@@ -181,7 +181,7 @@ impl<const D: usize> Window<D> {
         }
     }
 
-    fn visit_plane(&mut self, plane: usize, visit: &impl Fn(&Row<D>, &mut Vec<Crest<D>>)) {
+    fn visit_plane(&mut self, plane: usize, visit: &impl Fn(&Row<D>, &mut Vec<FeaturePoint<D>>)) {
         let n = self.grid.shape[0];
         let size: usize = self.grid.shape[..D - 1].iter().product();
         let mut crests = std::mem::take(&mut self.crests);
@@ -333,7 +333,7 @@ impl<const D: usize> Row<'_, D> {
         normal: [f32; D],
         offset: f32,
         strength: f32,
-    ) -> Option<Crest<D>> {
+    ) -> Option<FeaturePoint<D>> {
         let steps: [f32; D] =
             std::array::from_fn(|k| offset * normal[k] / self.grid.step[k] as f32);
         // NaN is no step
@@ -343,8 +343,13 @@ impl<const D: usize> Row<'_, D> {
         let mut sample = self.sample;
         sample[0] = x;
         let last = |k: usize| (self.grid.shape[k] - 1) as f32;
-        let point = std::array::from_fn(|k| (sample[k] as f32 + steps[k]).clamp(0.0, last(k)));
-        Some(Crest { index: self.index + x, point, normal, strength })
+        let place = |k: usize| (sample[k] as f32 + steps[k]).clamp(0.0, last(k));
+        Some(FeaturePoint {
+            index: self.index + x,
+            position: std::array::from_fn(|k| place(k).into()),
+            normal: normal.map(f64::from),
+            strength: strength.into(),
+        })
     }
 }
 

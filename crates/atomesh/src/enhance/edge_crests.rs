@@ -7,11 +7,11 @@
 //!    the second derivative at which the third is negative;
 //! 3. groups of crests that are strong somewhere, nowhere faint or as weak as noise, and large enough.
 
-use super::crest::{Crest, connected};
 use super::crossings::{Row, Unit, crossings, scale_strengths};
 use super::quantile::{Order, Ranks};
 use super::ridges::least_count;
 use super::{EnhanceError, LEAST_EDGE_SCALE, LONGEST, MOST_EXTENT, within};
+use crate::crests::{FeaturePoint, Hysteresis, linked};
 use crate::image::{Grid, coordinates};
 use crate::watch::{Phase, Watch, check};
 use serde::{Deserialize, Serialize};
@@ -81,7 +81,7 @@ pub(crate) fn edge_crests<const D: usize>(
     grid: &Grid<D>,
     options: &EdgeCrestOptions,
     watch: &mut dyn Watch,
-) -> Result<Vec<Crest<D>>, EnhanceError> {
+) -> Result<Vec<FeaturePoint<D>>, EnhanceError> {
     options.check()?;
     let Some(unit) = Unit::new(values) else { return Ok(Vec::new()) };
     check(watch, Phase::Potential, 0.0, None)?;
@@ -90,7 +90,7 @@ pub(crate) fn edge_crests<const D: usize>(
     let contrast = 0.5 * f64::from(unit.quantile(1.0 - ODD) - unit.quantile(ODD));
     let sigma = options.scale.unwrap_or_else(|| clear_scale::<D>(noise, contrast));
     let faint = (LEAST_ABOVE_NOISE * noise * noise_slope::<D>(sigma)) as f32;
-    let visit = |row: &Row<D>, crests: &mut Vec<Crest<D>>| {
+    let visit = |row: &Row<D>, crests: &mut Vec<FeaturePoint<D>>| {
         for x in 0..row.average.len() {
             let gradient = row.gradient(x);
             let steepness = gradient.iter().map(|g| g * g).sum::<f32>().sqrt();
@@ -107,7 +107,11 @@ pub(crate) fn edge_crests<const D: usize>(
     let mut crests = crossings(fill, &grid, sigma, visit, watch)?;
     scale_strengths(&mut crests);
     let least = least_count::<D>(options.least_length);
-    Ok(connected(crests, grid.shape, options.low, options.high, least))
+    Ok(linked(
+        crests,
+        grid.shape,
+        Hysteresis { low: options.low.into(), high: options.high.into(), least_count: least },
+    ))
 }
 
 /// The standard deviation of the image's noise, by the median magnitude of differences between neighbours along
@@ -184,7 +188,7 @@ mod tests {
         values: &[f32],
         grid: &Grid<D>,
         options: &EdgeCrestOptions,
-    ) -> Vec<Crest<D>> {
+    ) -> Vec<FeaturePoint<D>> {
         edge_crests(values, grid, options, &mut Silent).unwrap()
     }
 
@@ -214,7 +218,7 @@ mod tests {
             if (0..D).any(|k| !(6..grid.shape[k] - 6).contains(&sample[k])) {
                 continue; // where mirrored samples bend the edge
             }
-            let off = along(crest.point.map(f64::from));
+            let off = along(crest.position);
             // the slope of a hyperbolic tangent, smoothed, is nearly a bell
             assert!(off.abs() < 0.03, "{off} at {sample:?}");
             count += 1;
@@ -241,7 +245,7 @@ mod tests {
             found(&values, &grid, &EdgeCrestOptions { scale: Some(1.0), ..Default::default() });
         // smoothing by σ = 1 moves a curved edge inwards by σ²/R = 0.08 (Verbeek & van Vliet 1994); its
         // slope is a bell a little askew
-        let radii: Vec<f64> = crests.iter().map(|c| radius(c.point.map(f64::from))).collect();
+        let radii: Vec<f64> = crests.iter().map(|c| radius(c.position)).collect();
         assert!(radii.iter().all(|r| (r - 12.92).abs() < 0.15), "{radii:?}");
         let mean = radii.iter().sum::<f64>() / radii.len() as f64;
         assert!((mean - 12.92).abs() < 0.04, "{mean}");
@@ -329,7 +333,7 @@ mod tests {
         });
         let grid = Grid { shape, step: [1.0; 2] };
         let crests = found(&values, &grid, &EdgeCrestOptions::default());
-        let far = crests.iter().filter(|c| (c.point[0] - 49.5).abs() > 2.0).count();
+        let far = crests.iter().filter(|c| (c.position[0] - 49.5).abs() > 2.0).count();
         assert!(crests.len() >= 90 && far * 20 < crests.len(), "{far} of {}", crests.len());
     }
 

@@ -7,10 +7,10 @@
 //! 3. their strength over that of the amplitudes about them, so that weak deep reflections count;
 //! 4. groups of crests that are strong somewhere, nowhere faint, and large enough.
 
-use super::crest::{Crest, connected};
 use super::crossings::{Polarity, Row, Unit, crossings, scale_strengths};
 use super::ridges::least_count;
 use super::{EnhanceError, LEAST_EDGE_SCALE, LONGEST, MOST_EXTENT, within};
+use crate::crests::{FeaturePoint, Hysteresis, linked};
 use crate::image::{CellAverages, Entries, Grid, Stencil, Stream, StructureTensor};
 use crate::watch::{Phase, Watch, check};
 use serde::{Deserialize, Serialize};
@@ -100,7 +100,7 @@ pub(crate) fn horizons<const D: usize>(
     grid: &Grid<D>,
     options: &HorizonOptions,
     watch: &mut dyn Watch,
-) -> Result<Vec<Crest<D>>, EnhanceError> {
+) -> Result<Vec<FeaturePoint<D>>, EnhanceError> {
     options.check()?;
     let Some(unit) = Unit::new(values) else { return Ok(Vec::new()) };
     check(watch, Phase::Potential, 0.0, None)?;
@@ -114,7 +114,7 @@ pub(crate) fn horizons<const D: usize>(
     let tensor = StructureTensor::new(values, &grid, options.scale, smooth, watch)?;
     let stream = Stream::new(fill, &grid, Stencil::Gaussian(options.scale)).with_smoothed();
     let levels = CellAverages::new(&stream, grid.shape, smooth, &Level, watch)?;
-    let visit = |row: &Row<D>, crests: &mut Vec<Crest<D>>| {
+    let visit = |row: &Row<D>, crests: &mut Vec<FeaturePoint<D>>| {
         let Some(normals) = tensor.row(row.sample) else { return };
         let level = levels.row(row.sample);
         for (x, &value) in row.average.iter().enumerate() {
@@ -137,7 +137,11 @@ pub(crate) fn horizons<const D: usize>(
     let mut crests = crossings(fill, &grid, options.scale, visit, watch)?;
     scale_strengths(&mut crests);
     let least = least_count::<D>(options.least_length);
-    Ok(connected(crests, grid.shape, options.low, options.high, least))
+    Ok(linked(
+        crests,
+        grid.shape,
+        Hysteresis { low: options.low.into(), high: options.high.into(), least_count: least },
+    ))
 }
 
 #[cfg(test)]
@@ -172,8 +176,7 @@ mod tests {
                 if (0..D).any(|k| !(5..grid.shape[k] - 5).contains(&sample[k])) {
                     continue; // where mirrored samples bend the layers
                 }
-                let s: f64 =
-                    (0..D).map(|k| normal[k] * f64::from(crest.point[k]) * grid.step[k]).sum();
+                let s: f64 = (0..D).map(|k| normal[k] * crest.position[k] * grid.step[k]).sum();
                 let off = (s - phase + 4.0).rem_euclid(8.0) - 4.0;
                 // of a cosine of period 8 the slope is linear to 0.02 samples, and those mirrored at
                 // the box's sides turn normals a little

@@ -28,7 +28,8 @@ pub struct Share {
 /// assert_eq!(mixture.to_string(), "faults,horizons:0.5");
 /// # Ok::<(), atomesh::enhance::MixtureError>(())
 /// ```
-#[derive(Clone, Debug, PartialEq)]
+#[derive(Clone, Debug, PartialEq, serde::Serialize, serde::Deserialize)]
+#[serde(into = "String", try_from = "String")]
 pub struct Mixture(Vec<Share>);
 
 /// Why a text is no mixture.
@@ -55,6 +56,20 @@ pub enum MixtureError {
         /// The kind of features.
         name: String,
     },
+}
+
+impl From<Mixture> for String {
+    fn from(mixture: Mixture) -> Self {
+        mixture.to_string()
+    }
+}
+
+impl TryFrom<String> for Mixture {
+    type Error = MixtureError;
+
+    fn try_from(text: String) -> Result<Self, MixtureError> {
+        text.parse()
+    }
 }
 
 impl Mixture {

@@ -18,7 +18,6 @@
 //!
 //! Cost: a few passes over the samples. Memory: one f32 a sample beside the image.
 
-mod crest;
 mod crossings;
 mod edge_crests;
 mod denoise;
@@ -41,7 +40,7 @@ use scale::{Ramp, UnitSamples};
 use serde::{Deserialize, Serialize};
 use std::str::FromStr;
 
-use crest::{Crest, widen};
+use crate::crests::{FeaturePoint, widen};
 
 pub use crossings::Polarity;
 pub use edge_crests::EdgeCrestOptions;
@@ -427,7 +426,7 @@ fn thinned<const D: usize>(
             &copied
         }
     };
-    let crests: Vec<Crest<D>> = match options.features {
+    let crests: Vec<FeaturePoint<D>> = match options.features {
         Features::Ridges => ridges::ridges(values, &grid, &options.ridges, watch)?,
         Features::Faults => faults::faults(values, &grid, &options.faults, watch)?,
         Features::Horizons => horizons::horizons(values, &grid, &options.horizons, watch)?,

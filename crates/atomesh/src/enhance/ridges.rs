@@ -11,9 +11,9 @@
 //! The background is the median; a full feature is as bright as the 98th percentile of all crests. Departure
 //! from Hale: crossings are found between samples, so that what is made of them is alike at any slant.
 
-use super::crest::{Crest, connected};
 use super::crossings::{Polarity, Unit, crossings, scale_strengths};
 use super::{EnhanceError, LEAST_EDGE_SCALE, LONGEST, MOST_EXTENT, within};
+use crate::crests::{FeaturePoint, Hysteresis, linked};
 use crate::geometry::linear::largest_eigenpair;
 use crate::image::{Grid, StructureTensor};
 use crate::watch::{Phase, Watch, check};
@@ -80,7 +80,7 @@ pub(crate) fn ridges<const D: usize>(
     grid: &Grid<D>,
     options: &RidgeOptions,
     watch: &mut dyn Watch,
-) -> Result<Vec<Crest<D>>, EnhanceError> {
+) -> Result<Vec<FeaturePoint<D>>, EnhanceError> {
     options.check()?;
     let Some(unit) = Unit::new(values) else { return Ok(Vec::new()) };
     check(watch, Phase::Potential, 0.0, None)?;
@@ -97,7 +97,7 @@ pub(crate) fn ridges<const D: usize>(
     } else {
         None
     };
-    let visit = |row: &super::crossings::Row<D>, crests: &mut Vec<Crest<D>>| {
+    let visit = |row: &super::crossings::Row<D>, crests: &mut Vec<FeaturePoint<D>>| {
         let normals = tensor.as_ref().and_then(|tensor| tensor.row(row.sample));
         for (x, &value) in row.average.iter().enumerate() {
             if value <= 0.0 {
@@ -122,7 +122,11 @@ pub(crate) fn ridges<const D: usize>(
     }
     scale_strengths(&mut crests);
     let least = least_count::<D>(options.least_length);
-    Ok(connected(crests, grid.shape, options.low, options.high, least))
+    Ok(linked(
+        crests,
+        grid.shape,
+        Hysteresis { low: options.low.into(), high: options.high.into(), least_count: least },
+    ))
 }
 
 /// The direction in which the image is bent downwards most.
@@ -154,7 +158,7 @@ mod tests {
         values: &[f32],
         grid: &Grid<D>,
         options: &RidgeOptions,
-    ) -> Vec<Crest<D>> {
+    ) -> Vec<FeaturePoint<D>> {
         ridges(values, grid, options, &mut Silent).unwrap()
     }
 
@@ -173,14 +177,13 @@ mod tests {
             if !(0..D).all(|k| inner(k, sample[k])) {
                 continue; // where mirrored samples bend the sheet
             }
-            let from_middle = |k: usize| {
-                (f64::from(crest.point[k]) - 0.5 * (grid.shape[k] - 1) as f64) * grid.step[k]
-            };
+            let from_middle =
+                |k: usize| (crest.position[k] - 0.5 * (grid.shape[k] - 1) as f64) * grid.step[k];
             let off: f64 = (0..D).map(|k| normal[k] * from_middle(k)).sum();
             // 0.05/s² samples, s² = 1.5² + 1.5², where the slope is taken linear between samples; on a
             // volume's diagonal, where feet are as far as 0.6 √3 off, it is extended to 0.08
             assert!(off.abs() < 0.09 * grid.least_step(), "{off} at {sample:?} {normal:?}");
-            let cosine: f64 = (0..D).map(|k| normal[k] * f64::from(crest.normal[k])).sum();
+            let cosine: f64 = (0..D).map(|k| normal[k] * crest.normal[k]).sum();
             assert!(cosine.abs() > 0.999, "{cosine} {normal:?}");
             count += 1;
         }
@@ -221,7 +224,7 @@ mod tests {
         let crests = found(&ring(51), &grid, &options);
         let mut angles: Vec<f64> = Vec::new();
         for crest in crests {
-            let [x, y] = crest.point.map(|p| f64::from(p) - 25.0);
+            let [x, y] = crest.position.map(|p| p - 25.0);
             // smoothing by 1.5 moves a ring by about σ²/2R = 0.08, and tensors turn normals a little
             assert!((x.hypot(y) - 15.0).abs() < 0.15, "{}", x.hypot(y));
             angles.push(y.atan2(x));
@@ -243,7 +246,7 @@ mod tests {
         assert!(!a.is_empty() && a.len() == b.len());
         for (a, b) in a.iter().zip(&b) {
             assert_eq!(a.index, b.index);
-            assert!((0..2).all(|k| (a.point[k] - b.point[k]).abs() < 1e-3));
+            assert!((0..2).all(|k| (a.position[k] - b.position[k]).abs() < 1e-3));
         }
     }
 
@@ -280,7 +283,7 @@ mod tests {
                     RidgeOptions { normal_scale, least_length: 0.0, ..Default::default() };
                 for crest in found(&values, &grid, &options) {
                     let sample = coordinates(crest.index, shape);
-                    assert!((0..3).all(|k| (crest.point[k] - sample[k] as f32).abs() <= 0.6));
+                    assert!((0..3).all(|k| (crest.position[k] - sample[k] as f64).abs() <= 0.6001));
                     assert!((0.0..=1.0).contains(&crest.strength));
                 }
             }
@@ -299,11 +302,11 @@ mod tests {
         let swapped: Vec<f32> = (0..2601).map(|i| values[i % 51 * 51 + i / 51]).collect();
         let options = RidgeOptions { normal_scale: 3.0, ..Default::default() };
         let crests = found(&values, &grid, &options);
-        let near = |others: Vec<Crest<2>>, back: &dyn Fn([f32; 2]) -> [f32; 2]| {
-            let same = |a: &Crest<2>| {
+        let near = |others: Vec<FeaturePoint<2>>, back: &dyn Fn([f64; 2]) -> [f64; 2]| {
+            let same = |a: &FeaturePoint<2>| {
                 others.iter().any(|b| {
-                    let [x, y] = back(b.point);
-                    (a.point[0] - x).abs().max((a.point[1] - y).abs()) < 1e-2
+                    let [x, y] = back(b.position);
+                    (a.position[0] - x).abs().max((a.position[1] - y).abs()) < 1e-2
                 })
             };
             crests.iter().filter(|crest| same(crest)).count()

@@ -1,36 +1,21 @@
-//! What is dropped from chosen facets, and what is added to them.
+//! Dropping chosen facets that wrap a cell or make small pieces, and adding facets that close gaps.
 
 use std::collections::{HashMap, HashSet};
 
 use super::ridges::{Ridges, key};
-use super::{FacetField, FeatureFacetOptions, measure_of};
+use super::{FacetField, FeatureFacetOptions, corners_of, measure_and_mean};
 use crate::geometry::{Point, difference, dot};
 use crate::mesh::Mesh;
 
-/// Rounds of dropping; each but the last drops all of one kind and size, so that few are needed.
+/// Rounds of dropping at most. Each but the last drops all pieces of one kind and size, so that few are needed.
 const MOST_ROUNDS: usize = 1000;
 
 /// The least cosine of the angle by which a facet that closes a gap turns from those that it joins: 60°.
 const LEAST_COSINE: f64 = 0.5;
 
-/// The length or area of facets, and the mean of b over them.
-pub(super) fn measure_and_mean<const D: usize>(
-    mesh: &Mesh<D>,
-    field: &FacetField<D>,
-    facets: impl Iterator<Item = u32>,
-) -> (f64, f64) {
-    let (mut measure, mut sum) = (0.0, 0.0);
-    for facet in facets {
-        let part = measure_of(mesh, &field.facets()[facet as usize].corners);
-        measure += part;
-        sum += part * field.mean()[facet as usize];
-    }
-    (measure, if measure > 0.0 { sum / measure } else { 0.0 })
-}
-
-/// The chosen facets without one of each cell all of whose facets are chosen, that with the highest mean of b:
-/// a feature passes through a cell, it does not wrap it.
-pub(super) fn thin<const D: usize>(field: &FacetField<D>, chosen: Vec<u32>) -> Vec<u32> {
+/// The chosen facets, less one of each cell all of whose facets are chosen: that with the highest mean of b. A feature
+/// passes through a cell; it does not wrap it.
+pub(super) fn unwrap_cells<const D: usize>(field: &FacetField<D>, chosen: Vec<u32>) -> Vec<u32> {
     let cells = |facet: u32| {
         let facet = &field.facets()[facet as usize];
         std::iter::once(facet.cell).chain(facet.neighbour)
@@ -47,13 +32,16 @@ pub(super) fn thin<const D: usize>(field: &FacetField<D>, chosen: Vec<u32>) -> V
             *count += 1;
         }
     }
-    let whole = |cell: u32, facet: u32| of_cells[cell as usize] == (D + 1, facet);
-    chosen.into_iter().filter(|&facet| !cells(facet).any(|cell| whole(cell, facet))).collect()
+    let is_worst_of_all = |cell: u32, facet: u32| of_cells[cell as usize] == (D + 1, facet);
+    chosen
+        .into_iter()
+        .filter(|&facet| !cells(facet).any(|cell| is_worst_of_all(cell, facet)))
+        .collect()
 }
 
-/// The chosen facets without small pieces. Dropping one may make others into one piece that is large, so
-/// little is dropped at a time: first of pieces with the same rim all but that of the lowest mean of b; then
-/// those of fewest facets, the highest mean first, no two that meet at once.
+/// The chosen facets without small pieces. Dropping one may join others into one large piece, so little is dropped at a
+/// time: first, of pieces with the same rim, all but that of the lowest mean of b; then those of fewest facets, the
+/// highest mean first, and never two that meet in one round.
 pub(super) fn drop_small<const D: usize>(
     mesh: &Mesh<D>,
     field: &FacetField<D>,
@@ -61,7 +49,7 @@ pub(super) fn drop_small<const D: usize>(
     options: &FeatureFacetOptions,
 ) -> Vec<u32> {
     for _ in 0..MOST_ROUNDS {
-        let dropped = worst(mesh, field, &chosen, options);
+        let dropped = next_to_drop(mesh, field, &chosen, options);
         if dropped.is_empty() {
             break;
         }
@@ -73,7 +61,7 @@ pub(super) fn drop_small<const D: usize>(
     chosen
 }
 
-/// A piece that is small: the ridges where it meets others, the mean of b, and its facets by place.
+/// A small piece: the ridges where it meets others, its mean of b, and its facets by their places.
 struct Small {
     rim: Vec<u64>,
     mean: f64,
@@ -81,17 +69,20 @@ struct Small {
 }
 
 /// The facets, by place, that one round drops.
-fn worst<const D: usize>(
+fn next_to_drop<const D: usize>(
     mesh: &Mesh<D>,
     field: &FacetField<D>,
     chosen: &[u32],
     options: &FeatureFacetOptions,
 ) -> Vec<u32> {
-    let ridges = Ridges::new(field, chosen);
+    let ridges = Ridges::new(&corners_of(field, chosen));
     let mut small = Vec::new();
     for facets in ridges.pieces() {
-        let indices = facets.iter().map(|&at| chosen[at as usize]);
-        let (measure, mean) = measure_and_mean(mesh, field, indices);
+        let values = facets.iter().map(|&at| {
+            let facet = chosen[at as usize] as usize;
+            (&field.facets()[facet].corners, field.mean()[facet])
+        });
+        let (measure, mean) = measure_and_mean(mesh, values);
         if facets.len() < options.min_facets || measure < options.min_measure {
             small.push(Small { rim: rim(&ridges, &facets), mean, facets });
         }
@@ -100,10 +91,10 @@ fn worst<const D: usize>(
     small.sort_by(|a, b| {
         a.rim.cmp(&b.rim).then(a.mean.total_cmp(&b.mean)).then(a.facets.cmp(&b.facets))
     });
-    // two points bound a way in the plane, three edges or more a patch in space
-    let is_twin = |pair: &&[Small]| pair[0].rim.len() >= D && pair[0].rim == pair[1].rim;
-    let twins = small.windows(2).filter(is_twin);
-    let dropped: Vec<u32> = twins.flat_map(|pair| pair[1].facets.iter().copied()).collect();
+    // two points bound a path in the plane, three edges or more a patch in space
+    let have_one_rim = |pair: &&[Small]| pair[0].rim.len() >= D && pair[0].rim == pair[1].rim;
+    let doubles = small.windows(2).filter(have_one_rim);
+    let dropped: Vec<u32> = doubles.flat_map(|pair| pair[1].facets.iter().copied()).collect();
     if !dropped.is_empty() {
         return dropped;
     }
@@ -131,16 +122,16 @@ fn rim<const D: usize>(ridges: &Ridges<D>, piece: &[u32]) -> Vec<u64> {
     joined
 }
 
-/// The chosen facets, ascending, and those that join free ridges of them without turning by more than 60°:
-/// edges between two free ends (2-D), triangles with two or three free sides (3-D). The lowest mean of b
-/// comes first; a ridge is joined once.
+/// The chosen facets, and those that join free ridges of them without turning by more than 60°: edges between two free
+/// ends (2-D), triangles with two or three free sides (3-D). Facets of the lowest mean of b come first; a ridge is
+/// joined once. The result ascends.
 pub(super) fn close_gaps<const D: usize>(
     mesh: &Mesh<D>,
     field: &FacetField<D>,
     mut chosen: Vec<u32>,
 ) -> Vec<u32> {
     // the only facet at each free ridge
-    let ridges = Ridges::new(field, &chosen);
+    let ridges = Ridges::new(&corners_of(field, &chosen));
     let mut free: HashMap<u64, u32> = HashMap::new();
     for (at, &facet) in chosen.iter().enumerate() {
         for opposite in (0..D).filter(|&k| ridges.count(at as u32, k) == 1) {
@@ -155,15 +146,14 @@ pub(super) fn close_gaps<const D: usize>(
         .collect();
     candidates.sort_by(|a, b| a.0.total_cmp(&b.0).then(a.1.cmp(&b.1)));
     for (_, facet) in candidates {
-        let sides: Vec<(u64, u32)> = free_sides(field, facet, &free).collect();
-        let goes_on = |&(ridge, other): &(u64, u32)| {
-            cosine(mesh, field, [facet, other], ridge) >= LEAST_COSINE
-        };
+        let sides: Vec<FreeSide> = free_sides(field, facet, &free).collect();
+        let goes_on =
+            |side: &FreeSide| cosine(mesh, field, [facet, side.facet], side.ridge) >= LEAST_COSINE;
         if sides.len() < 2 || !sides.iter().all(goes_on) {
             continue;
         }
-        for (ridge, _) in &sides {
-            free.remove(ridge);
+        for side in &sides {
+            free.remove(&side.ridge);
         }
         chosen.push(facet);
     }
@@ -171,21 +161,27 @@ pub(super) fn close_gaps<const D: usize>(
     chosen
 }
 
-/// The free ridges among a facet's, each with the chosen facet there.
+/// A ridge that only one chosen facet has, and that facet.
+struct FreeSide {
+    ridge: u64,
+    facet: u32,
+}
+
+/// The free ridges among a facet's.
 fn free_sides<'a, const D: usize>(
     field: &'a FacetField<D>,
     facet: u32,
     free: &'a HashMap<u64, u32>,
-) -> impl Iterator<Item = (u64, u32)> + 'a {
+) -> impl Iterator<Item = FreeSide> + 'a {
     let corners = &field.facets()[facet as usize].corners;
     (0..D).filter_map(move |opposite| {
         let ridge = key(corners, opposite);
-        free.get(&ridge).map(|&other| (ridge, other))
+        free.get(&ridge).map(|&facet| FreeSide { ridge, facet })
     })
 }
 
-/// The cosine of the angle by which one facet turns from the other at the ridge that they share: 1 where they
-/// go straight on.
+/// The cosine of the angle by which one facet turns from the other at the ridge that they share: 1 if they lie in one
+/// line or plane.
 fn cosine<const D: usize>(
     mesh: &Mesh<D>,
     field: &FacetField<D>,

@@ -11,7 +11,7 @@ use crate::watch::{Phase, Watch, check};
 /// Facets between two looks at the watch, a fixed number so that results do not depend on threads.
 const BLOCK: usize = 1 << 16;
 
-/// The most parts that an edge of a facet is divided into.
+/// Most parts into which an edge of a facet is divided.
 const MOST_PARTS: f64 = 64.0;
 
 /// The facets between two cells of a mesh, each with the mean and the greatest b along it.
@@ -27,10 +27,9 @@ pub struct FacetField<const D: usize> {
 impl<const D: usize> FacetField<D> {
     /// b read between samples along the facets of a mesh in the potential's lattice coordinates.
     ///
-    /// The mean is taken over parts of equal size, by the value at the middle of each: parts of an edge are
-    /// at most half a step long (2-D), the sides of parts of a triangle at most one step (3-D), but there are
-    /// no more than 64 along a side. Along a valley one step wide and −1 deep the mean is right to 0.01. The greatest is that
-    /// of these values and those at the corners.
+    /// The mean is that of the values at the middles of equal parts. Parts of an edge (2-D) are at most half a step long,
+    /// the sides of parts of a triangle (3-D) at most one step, with no more than 64 along a side. Along a valley one step
+    /// wide and −1 deep the mean is right to 0.01. The greatest is that of these values and those at the corners.
     ///
     /// # Errors
     /// [`FeaturesError::Cancelled`] if the watch ends the work.
@@ -57,7 +56,7 @@ impl<const D: usize> FacetField<D> {
     }
 
     /// b along facets from its values at the mesh's points alone: the mean and the greatest of those at the
-    /// corners. What lies between is not seen: a facet whose corners are on two features seems to be on one.
+    /// corners. What lies between is not seen: a facet with its corners on two features seems to lie on one.
     ///
     /// # Errors
     /// [`FeaturesError::PointCount`] if there is not one value for each point.
@@ -96,7 +95,7 @@ impl<const D: usize> FacetField<D> {
         &self.greatest
     }
 
-    /// What is held against the threshold for the facet of that index.
+    /// The value of the facet of that index that is compared with the threshold.
     pub(super) fn value(&self, facet: usize, test: FacetTest) -> f64 {
         match test {
             FacetTest::Mean => self.mean[facet],
@@ -144,7 +143,7 @@ fn each_middle<const D: usize>(parts: usize, mut visit: impl FnMut([f64; D])) {
             continue;
         }
         for j in 0..parts - i {
-            // the part that points as the whole does, and the one that stands on its head beside it
+            // the part that points the same way as the whole, and the inverted one beside it
             let heads = if i + j + 1 < parts { 2 } else { 1 };
             for head in 1..=heads {
                 let third = f64::from(head) / 3.0;

@@ -1,16 +1,17 @@
 //! Features of an image as facets of a mesh: faults, horizons, outlines (Hale 2001, Fig. 10).
 //!
-//! In order: b is read along every facet between two cells ([`FacetField`]); facets that pass a threshold
-//! are chosen; gaps of one facet are closed, if asked for; what is small or double is dropped; the rest is
-//! split into connected pieces where more than two chosen facets meet, each turned one way, the largest
-//! first ([`find_features`]).
+//! In order ([`find_features`]): b is read along every facet between two cells ([`FacetField`]). Facets that pass a
+//! threshold are chosen. Gaps of one facet are closed, if asked for. Small and double pieces are dropped. The rest is
+//! split into connected pieces where more than two chosen facets meet, each turned one way, the largest first
+//! ([`FeatureSet::of_facets`]).
 //!
-//! Where pieces meet they share the mesh's points. In the plane a piece is a polyline and its facets follow
-//! one another; in space it is a surface. Cost: reading b, O(facets) with some 10 to 100 samples each; the
-//! rest O(n log n) in chosen facets. Assumes that the mesh is valid. The result is the same at any thread
-//! count.
+//! Where pieces meet they share the mesh's points. In the plane a piece is a polyline, its facets one after another; in
+//! space it is a surface. [`feature_faces`] finds the faces of polygons and polyhedra that lie on features. Cost:
+//! reading b, O(facets) with some 10 to 100 samples each; the rest O(n log n) in chosen facets. Assumes a valid mesh.
+//! The result is the same at any thread count.
 
 mod clean;
+mod faces;
 mod field;
 mod orient;
 mod ridges;
@@ -18,31 +19,32 @@ mod ridges;
 mod tests;
 
 use crate::geometry::{Bounds, dot};
-use crate::mesh::{FacetGroup, Mesh, Regions, Tags, TagsError};
-use crate::region::{components, islands};
+use crate::mesh::{FacetGroup, Mesh, Regions, Tags, TagsError, feature_name};
+use crate::region::{components, join_islands};
 use crate::watch::Cancelled;
+pub use faces::{FeatureFaces, feature_faces};
 pub use field::FacetField;
-use orient::Piece;
+use orient::{Oriented, Piece};
 use ridges::Ridges;
 
-/// Which value of b along a facet is held against the threshold.
+/// Which value of b along a facet is compared with the threshold.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, serde::Serialize, serde::Deserialize)]
 #[serde(rename_all = "kebab-case")]
 pub enum FacetTest {
     /// The mean: a facet may leave the feature for a part of its length.
     #[default]
     Mean,
-    /// The greatest: the facet lies in the feature everywhere.
+    /// The greatest: the whole facet lies in the feature.
     Max,
 }
 
 /// How facets are chosen and cleaned.
 #[derive(Clone, Debug, PartialEq)]
 pub struct FeatureFacetOptions {
-    /// Facets whose value of b is at most this are chosen; −1 to 1. Default −0.2: on a section of thin faults
-    /// between 0, of facets that leave features, and −0.5, which only facets along straight ones reach.
+    /// Facets whose value of b is at most this are chosen; −1 to 1. Default −0.2. On a section of thin faults, facets
+    /// that leave features have about 0, and only facets along straight ones reach −0.5.
     pub below: f64,
-    /// The value of b that counts. Default the mean.
+    /// The value of b that is compared. Default the mean.
     pub test: FacetTest,
     /// Pieces of fewer facets are dropped. Default 3.
     pub min_facets: usize,
@@ -68,13 +70,13 @@ impl Default for FeatureFacetOptions {
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]
 #[non_exhaustive]
 pub enum FeaturesError {
-    /// The threshold is no value of b.
+    /// The threshold is out of the range of b.
     #[error("the threshold is {value}; expected -1 to 1, as b(x) is")]
     Threshold {
         /// The threshold given.
         value: f64,
     },
-    /// The least length or area is negative or no number.
+    /// The least length or area is negative or not finite.
     #[error("the least length or area of a piece is {value}; expected 0 or more")]
     MinMeasure {
         /// The value given.
@@ -102,7 +104,7 @@ pub struct Feature<const D: usize> {
     pub facets: Vec<[u32; D]>,
     /// The mean of b over the piece, weighted by length or area.
     pub mean: f64,
-    /// Whether all normals agree; no surface with one side has such.
+    /// Whether all normals agree; on a one-sided surface they cannot.
     pub orientable: bool,
     /// Whether it has no end (2-D) or border (3-D), neither free nor at another piece.
     pub closed: bool,
@@ -126,11 +128,11 @@ pub struct Selection {
     pub chosen: usize,
     /// Facets added to close gaps.
     pub added: usize,
-    /// Facets dropped since they wrapped a cell, or their piece was small.
+    /// Facets dropped because they wrapped a cell or their piece was small.
     pub dropped: usize,
 }
 
-/// A piece in numbers, for reports.
+/// A feature in numbers, for reports.
 #[derive(Clone, Debug, PartialEq, serde::Serialize)]
 pub struct FeatureReport {
     /// Its number, 1 for the largest.
@@ -155,10 +157,9 @@ pub struct FeatureReport {
 
 /// Finds the features of a mesh among facets with their values of b.
 ///
-/// Of a cell all of whose facets are chosen, that with the highest mean of b is dropped. Small pieces are
-/// dropped: of those with the same ends or rim at other pieces, as the two ways through a flat tetrahedron
-/// are, all but that with the lowest mean; then those of fewest facets first, since others may be one piece
-/// without them.
+/// If all facets of a cell are chosen, the one with the highest mean of b is dropped. Then small pieces are dropped.
+/// First, of pieces with the same ends or rim at other pieces, such as the two paths through a flat tetrahedron, all
+/// but that with the lowest mean. Then those of fewest facets first, since others may become one piece without them.
 ///
 /// # Errors
 /// [`FeaturesError`] if an option is out of range.
@@ -177,7 +178,7 @@ pub fn find_features<const D: usize>(
         .filter(|&facet| field.value(facet as usize, options.test) <= options.below)
         .collect();
     let mut selection = Selection { chosen: chosen.len(), ..Selection::default() };
-    chosen = clean::thin(field, chosen);
+    chosen = clean::unwrap_cells(field, chosen);
     if options.close_gaps {
         let before = chosen.len();
         chosen = clean::close_gaps(mesh, field, chosen);
@@ -185,48 +186,49 @@ pub fn find_features<const D: usize>(
     }
     let kept = clean::drop_small(mesh, field, chosen, options);
     selection.dropped = selection.chosen + selection.added - kept.len();
-    let ridges = Ridges::new(field, &kept);
-    let mut features: Vec<(f64, Feature<D>)> =
-        (ridges.pieces().iter()).map(|piece| feature(mesh, field, &kept, &ridges, piece)).collect();
-    // larger first; the sort is stable and pieces come by their lowest facet
-    features.sort_by(|a, b| b.0.total_cmp(&a.0));
-    let features = features.into_iter().map(|(_, feature)| feature).collect();
-    Ok(FeatureSet { features, intersections: ridges.intersections(), selection })
+    let mean: Vec<f64> = kept.iter().map(|&facet| field.mean()[facet as usize]).collect();
+    let features = FeatureSet::of_facets(mesh, &corners_of(field, &kept), &mean);
+    Ok(FeatureSet { selection, ..features })
 }
 
-/// A piece with its length or area.
-fn feature<const D: usize>(
-    mesh: &Mesh<D>,
-    field: &FacetField<D>,
-    kept: &[u32],
-    ridges: &Ridges<D>,
-    piece: &[u32],
-) -> (f64, Feature<D>) {
-    let (measure, mean) =
-        clean::measure_and_mean(mesh, field, piece.iter().map(|&at| kept[at as usize]));
-    let oriented = Piece { mesh, field, kept, ridges, facets: piece }.oriented();
-    let closed = piece.iter().all(|&at| ridges.neighbours(at).all(|n| n.is_some()));
-    let feature =
-        Feature { facets: oriented.facets, mean, orientable: oriented.orientable, closed };
-    (measure, feature)
-}
-
-/// Whether a group of facets has a name that [`FeatureSet::name`] gives.
-pub fn is_feature_name(name: &str) -> bool {
-    name.strip_prefix("feature-").is_some_and(|number| number.parse::<u32>().is_ok())
+/// The corners of the facets of those indices in the field.
+fn corners_of<const D: usize>(field: &FacetField<D>, indices: &[u32]) -> Vec<[u32; D]> {
+    indices.iter().map(|&facet| field.facets()[facet as usize].corners).collect()
 }
 
 impl<const D: usize> FeatureSet<D> {
-    /// The name of the feature with that place in the list.
-    pub fn name(index: usize) -> String {
-        format!("feature-{}", index + 1)
+    /// The connected pieces of given facets of a mesh, split where more than two meet. `facets` are different and
+    /// ascend, as their corners do; `mean` is the mean of b over each. The selection counts them as chosen.
+    ///
+    /// # Panics
+    /// If there is not one mean for each facet, or a corner is not a point of the mesh.
+    pub fn of_facets(mesh: &Mesh<D>, facets: &[[u32; D]], mean: &[f64]) -> Self {
+        assert_eq!(facets.len(), mean.len(), "one mean a facet");
+        let ridges = Ridges::new(facets);
+        let feature = |piece: Vec<u32>| {
+            let values = piece.iter().map(|&at| (&facets[at as usize], mean[at as usize]));
+            let (measure, mean) = measure_and_mean(mesh, values);
+            let Oriented { facets, orientable } =
+                Piece { mesh, all: facets, ridges: &ridges, facets: &piece }.oriented();
+            let closed = piece.iter().all(|&at| ridges.neighbours(at).all(|n| n.is_some()));
+            (measure, Feature { facets, mean, orientable, closed })
+        };
+        let mut features: Vec<(f64, Feature<D>)> =
+            ridges.pieces().into_iter().map(feature).collect();
+        // larger first; the sort is stable and pieces come by their lowest facet
+        features.sort_by(|a, b| b.0.total_cmp(&a.0));
+        Self {
+            features: features.into_iter().map(|(_, feature)| feature).collect(),
+            intersections: ridges.intersections(),
+            selection: Selection { chosen: facets.len(), ..Selection::default() },
+        }
     }
 
     /// The features as groups of facets, numbered from 1 and named `feature-1`, `feature-2` …
     pub fn groups(&self) -> Vec<FacetGroup<D>> {
         let group = |(index, feature): (usize, &Feature<D>)| FacetGroup {
             id: index as u32 + 1,
-            name: Self::name(index),
+            name: feature_name(index as u32 + 1),
             facets: feature.facets.clone(),
         };
         self.features.iter().enumerate().map(group).collect()
@@ -240,21 +242,21 @@ impl<const D: usize> FeatureSet<D> {
         Tags::new(mesh, self.groups(), None)
     }
 
-    /// The parts into which the features cut the mesh, numbered from 1 in the order of their first cells; those of
-    /// fewer than `least` cells, such as a cell with features on all sides, go to the neighbour that they share
-    /// most facets with. Features that end inside the mesh part nothing.
+    /// The parts into which the features cut the mesh, numbered from 1 in the order of their first cells. Parts of fewer
+    /// than `least` cells, such as a cell with features on all sides, join the part with which they share most facets.
+    /// Features that end inside the mesh separate nothing.
     pub fn regions(&self, mesh: &Mesh<D>, least: usize) -> Regions {
         let walls: Vec<[u32; D]> =
             self.features.iter().flat_map(|feature| feature.facets.iter().copied()).collect();
         let mut of_cells = components(mesh, &walls);
         if least > 1 {
-            islands(mesh, &mut of_cells, least);
+            join_islands(mesh, &mut of_cells, least);
         }
         Regions { of_cells, names: Vec::new() }
     }
 
-    /// Each feature in numbers, in the coordinates of `mesh`: that in which they were found, or the same
-    /// with its points moved to the world.
+    /// Each feature in numbers, in the coordinates of `mesh`: the mesh in which they were found, or the same mesh moved
+    /// to the world.
     ///
     /// # Panics
     /// If the mesh has fewer points than the features name.
@@ -266,7 +268,7 @@ impl<const D: usize> FeatureSet<D> {
             let side = |of: fn(Bounds<D>) -> [f64; D]| bounds.map_or(vec![], |b| of(b).to_vec());
             FeatureReport {
                 id: index as u32 + 1,
-                name: Self::name(index),
+                name: feature_name(index as u32 + 1),
                 facets: feature.facets.len(),
                 measure: feature.facets.iter().map(|facet| measure_of(mesh, facet)).sum(),
                 mean: feature.mean,
@@ -284,4 +286,18 @@ impl<const D: usize> FeatureSet<D> {
 fn measure_of<const D: usize>(mesh: &Mesh<D>, facet: &[u32; D]) -> f64 {
     let normal = mesh.facet_normal(facet);
     dot(&normal, &normal).sqrt()
+}
+
+/// The length or area of facets, given as corners with their mean of b, and the mean of b over all.
+fn measure_and_mean<'a, const D: usize>(
+    mesh: &Mesh<D>,
+    facets: impl Iterator<Item = (&'a [u32; D], f64)>,
+) -> (f64, f64) {
+    let (mut measure, mut sum) = (0.0, 0.0);
+    for (corners, mean) in facets {
+        let part = measure_of(mesh, corners);
+        measure += part;
+        sum += part * mean;
+    }
+    (measure, if measure > 0.0 { sum / measure } else { 0.0 })
 }

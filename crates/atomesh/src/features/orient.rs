@@ -1,6 +1,5 @@
 //! Turning the facets of a piece one way.
 
-use super::FacetField;
 use super::ridges::Ridges;
 use crate::geometry::{Point, lexicographic};
 use crate::mesh::Mesh;
@@ -11,12 +10,12 @@ pub(super) struct Oriented<const D: usize> {
     pub orientable: bool,
 }
 
-/// A piece, as the places of its facets among the `kept`, ascending.
+/// A piece of the facets `all`, whose corners ascend.
 pub(super) struct Piece<'a, const D: usize> {
     pub mesh: &'a Mesh<D>,
-    pub field: &'a FacetField<D>,
-    pub kept: &'a [u32],
+    pub all: &'a [[u32; D]],
     pub ridges: &'a Ridges<D>,
+    /// The places of the piece's facets among all, ascending.
     pub facets: &'a [u32],
 }
 
@@ -37,10 +36,10 @@ impl<const D: usize> Piece<'_, D> {
     }
 
     fn corners(&self, facet: u32) -> [u32; D] {
-        self.field.facets()[self.kept[facet as usize] as usize].corners
+        self.all[facet as usize]
     }
 
-    /// The facets one after another from an end, in the plane.
+    /// The facets of a polyline (2-D), one after another from an end.
     fn line(&self) -> Vec<[u32; D]> {
         let point = |corner: u32| &self.mesh.points()[corner as usize];
         // the corner of an end, the facet there, and the number of that corner in it

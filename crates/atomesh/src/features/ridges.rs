@@ -1,11 +1,9 @@
-//! How chosen facets hang together: a *ridge* is a point (2-D) or an edge (3-D) of them.
-
-use super::FacetField;
+//! How facets are connected. A *ridge* is a point (2-D) or an edge (3-D) of facets.
 
 /// A ridge as one number: its point, or its two ends, the lower first.
 type Key = u64;
 
-/// Who meets at each ridge of some facets. Facets are named by their place among the chosen.
+/// The facets that meet at each ridge of some facets. A facet is named by its place among them.
 pub(super) struct Ridges<const D: usize> {
     /// The facets at ridges: key, facet, and the number of the facet's corner off the ridge; ascending.
     meets: Vec<(Key, u32, u8)>,
@@ -15,17 +13,16 @@ pub(super) struct Ridges<const D: usize> {
 }
 
 impl<const D: usize> Ridges<D> {
-    /// The ridges of the facets of those indices in the field.
-    pub fn new(field: &FacetField<D>, chosen: &[u32]) -> Self {
-        let mut meets: Vec<(Key, u32, u8)> = Vec::with_capacity(chosen.len() * D);
-        for (at, &facet) in chosen.iter().enumerate() {
-            let corners = &field.facets()[facet as usize].corners;
+    /// The ridges of facets with ascending corners.
+    pub fn new(facets: &[[u32; D]]) -> Self {
+        let mut meets: Vec<(Key, u32, u8)> = Vec::with_capacity(facets.len() * D);
+        for (at, corners) in facets.iter().enumerate() {
             for opposite in 0..D {
                 meets.push((key(corners, opposite), at as u32, opposite as u8));
             }
         }
         meets.sort_unstable();
-        let mut runs = vec![(0, 0); chosen.len() * D];
+        let mut runs = vec![(0, 0); facets.len() * D];
         let mut start = 0;
         for run in meets.chunk_by(|a, b| a.0 == b.0) {
             for (_, facet, opposite) in run {
@@ -34,7 +31,7 @@ impl<const D: usize> Ridges<D> {
             }
             start += run.len();
         }
-        Self { meets, runs, facet_count: chosen.len() }
+        Self { meets, runs, facet_count: facets.len() }
     }
 
     /// How many facets meet at the ridge of a facet opposite to a corner.
@@ -47,8 +44,8 @@ impl<const D: usize> Ridges<D> {
         self.meets[self.runs[facet as usize * D + opposite].0 as usize].0
     }
 
-    /// For each corner of a facet, the facet that continues it over the opposite ridge and its corner off
-    /// that ridge; `None` where it is alone or more than two meet.
+    /// For each corner of a facet, the facet that continues it over the opposite ridge, and the number of that facet's
+    /// corner off the ridge; `None` where the facet is alone or more than two meet.
     pub fn neighbours(&self, facet: u32) -> impl Iterator<Item = Option<(u32, u8)>> + '_ {
         (0..D).map(move |opposite| {
             let (start, count) = self.runs[facet as usize * D + opposite];
@@ -61,7 +58,7 @@ impl<const D: usize> Ridges<D> {
         })
     }
 
-    /// The facets of each piece that hangs together over ridges of two facets, ascending; pieces by their
+    /// The facets of each piece, ascending: facets connected over ridges where exactly two meet. Pieces come by their
     /// lowest facet.
     pub fn pieces(&self) -> Vec<Vec<u32>> {
         let mut piece_of = vec![false; self.facet_count];
@@ -98,6 +95,7 @@ pub(super) fn key<const D: usize>(corners: &[u32; D], opposite: usize) -> Key {
     (0..D).filter(|&k| k != opposite).fold(0, |key, k| key << 32 | Key::from(corners[k]))
 }
 
+/// The points of a ridge.
 fn points<const D: usize>(key: Key) -> Vec<u32> {
     (1..D).rev().map(|k| (key >> (32 * (k - 1))) as u32).collect()
 }

@@ -34,7 +34,8 @@ pub enum Align {
 }
 
 /// How a mesh is improved.
-#[derive(Clone, Debug, PartialEq)]
+#[derive(Clone, Debug, PartialEq, serde::Serialize, serde::Deserialize)]
+#[serde(deny_unknown_fields)]
 pub struct ImproveOptions {
     /// Which means are used.
     pub align: Align,

@@ -1,12 +1,12 @@
 //! How well the facets of a mesh follow the features of a potential.
 
 use super::MeasureError;
-use super::features::{Features, check_size};
+use super::features::check_size;
 use super::nearest::{FacetTree, Near};
 use super::precision::PrecisionReport;
 use super::statistics::{percentile, sum};
-use crate::mesh::Mesh;
-use crate::voronoi::PolyMesh;
+use crate::crests::FeaturePoint;
+use crate::mesh::{Mesh, PolyMesh};
 use crate::watch::{Phase, Watch, check};
 use rand::{Rng, SeedableRng};
 use rayon::prelude::*;
@@ -69,7 +69,7 @@ pub struct AlignmentReport {
 /// [`MeasureError`] if the mesh has no cells, the size is no length, or the watch ends the work.
 pub fn alignment<const D: usize>(
     mesh: &Mesh<D>,
-    features: &Features<D>,
+    features: &[FeaturePoint<D>],
     options: &AlignmentOptions,
     watch: &mut dyn Watch,
 ) -> Result<AlignmentReport, MeasureError> {
@@ -88,32 +88,30 @@ pub fn alignment<const D: usize>(
 /// [`MeasureError`] if the size is no length, or the watch ends the work.
 pub fn alignment_of_faces<const D: usize>(
     mesh: &PolyMesh<D>,
-    features: &Features<D>,
+    features: &[FeaturePoint<D>],
     options: &AlignmentOptions,
     watch: &mut dyn Watch,
 ) -> Result<AlignmentReport, MeasureError> {
     check_size(options.size)?;
     check(watch, Phase::Measure, 0.0, None)?;
-    let facets = (0..mesh.face_count()).flat_map(|face| mesh.parts(face)).collect();
+    let facets = (0..mesh.face_count()).flat_map(|face| mesh.face_parts(face)).collect();
     alignment_by(&FacetTree::of(mesh.points(), facets), features, options, watch)
 }
 
 fn alignment_by<const D: usize>(
     tree: &FacetTree<'_, D>,
-    features: &Features<D>,
+    features: &[FeaturePoint<D>],
     options: &AlignmentOptions,
     watch: &mut dyn Watch,
 ) -> Result<AlignmentReport, MeasureError> {
     let tau = (0.1 * options.size).max(1.0);
     let near = Near { distance: tau, sine_squared: options.tangent.to_radians().sin().powi(2) };
-    let picked = pick(features.positions.len(), options.limit, options.seed);
+    let picked = pick(features.len(), options.limit, options.seed);
     let mut found = Vec::with_capacity(picked.len());
     for block in picked.chunks(POINTS_PER_STEP) {
         check(watch, Phase::Measure, found.len() as f64 / picked.len() as f64, None)?;
         found.par_extend(
-            block
-                .par_iter()
-                .map(|&i| tree.query(&features.positions[i], &features.normals[i], near)),
+            block.par_iter().map(|&i| tree.query(&features[i].position, &features[i].normal, near)),
         );
     }
 
@@ -124,7 +122,7 @@ fn alignment_by<const D: usize>(
     let dist_p95 = (count > 0).then(|| percentile(&mut distances, 95.0));
     Ok(AlignmentReport {
         features: count,
-        features_found: features.positions.len(),
+        features_found: features.len(),
         tau,
         recall: share(found.iter().filter(|f| f.1).count() as f64),
         dist_mean,
@@ -154,7 +152,6 @@ fn pick(count: usize, limit: usize, seed: u64) -> Vec<usize> {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::geometry::Point;
     use crate::watch::Silent;
 
     /// A square of n × n samples in n − 1 columns and rows of squares, each cut in two triangles,
@@ -175,9 +172,10 @@ mod tests {
     }
 
     /// Points on the line x = `x`, whose normal is along x.
-    fn upright(x: f64) -> Features<2> {
-        let positions: Vec<Point<2>> = (0..40).map(|i| [x, f64::from(i) + 0.5]).collect();
-        Features { normals: vec![[-1.0, 0.0]; positions.len()], positions }
+    fn upright(x: f64) -> Vec<FeaturePoint<2>> {
+        let at =
+            |y| FeaturePoint { index: 0, position: [x, y], normal: [-1.0, 0.0], strength: 1.0 };
+        (0..40).map(|i| at(f64::from(i) + 0.5)).collect()
     }
 
     #[test]
@@ -201,11 +199,11 @@ mod tests {
         for (shear, recalled) in
             [(8.0 * 18.4f64.to_radians().tan(), true), (8.0 * 21f64.to_radians().tan(), false)]
         {
-            let crossing =
-                Features { positions: vec![[16.0 + shear * 2.5, 20.0]], normals: vec![[1.0, 0.0]] };
+            let position = [16.0 + shear * 2.5, 20.0];
+            let crossing = FeaturePoint { index: 0, position, normal: [1.0, 0.0], strength: 1.0 };
             let mesh = ruled(8, shear);
             let report =
-                alignment(&mesh, &crossing, &AlignmentOptions::new(8.0), &mut Silent).unwrap();
+                alignment(&mesh, &[crossing], &AlignmentOptions::new(8.0), &mut Silent).unwrap();
             assert_eq!(report.recall, Some(if recalled { 1.0 } else { 0.0 }));
             assert!(report.dist_mean.unwrap() < 1e-14);
         }
@@ -224,7 +222,7 @@ mod tests {
 
     #[test]
     fn no_features_give_no_shares() {
-        let none = Features::<2>::default();
+        let none: Vec<FeaturePoint<2>> = Vec::new();
         let report =
             alignment(&ruled(3, 0.0), &none, &AlignmentOptions::new(8.0), &mut Silent).unwrap();
         assert_eq!((report.features, report.recall, report.dist_mean), (0, None, None));

@@ -1,53 +1,55 @@
 //! Features of a potential that a mesh is measured against: its valleys.
 //!
 //! Only what a mesh with edges of length d can be asked to follow counts: valleys of b smoothed by
-//! σ = max(1, d/6) samples, deeper than 1/4, that hang together, corner to corner, in groups of at least 4d
-//! (2-D) or 6d² (3-D) samples. [`crate::crests`] finds them.
+//! σ = max(1, d/6) samples, deeper than 1/4, in large groups ([`crate::crests`] finds them).
 
 use super::MeasureError;
-use crate::crests::{Search, bottoms, in_large_groups};
-use crate::geometry::Point;
+use crate::crests::{FeaturePoint, ValleySearch, bottoms, in_large_groups};
 use crate::watch::{Phase, Watch};
 
-/// A valley must be deeper than this, of 1.
+/// The least depth of a valley, of 1.
 const LEAST_DEPTH: f32 = 0.25;
 
-/// Points on the features of a potential, in sample coordinates.
-#[derive(Clone, Debug, Default, PartialEq)]
-pub struct Features<const D: usize> {
-    /// Points at the bottom of valleys, about one a sample.
-    pub positions: Vec<Point<D>>,
-    /// The unit normal of the feature at each point; its sign means nothing.
-    pub normals: Vec<Point<D>>,
+/// The samples of a potential b(x).
+#[derive(Clone, Copy, Debug)]
+pub struct SampledPotential<'a, const D: usize> {
+    /// b at the samples, x fastest.
+    pub values: &'a [f32],
+    /// Samples along x, y (and z).
+    pub shape: [usize; D],
 }
 
-/// The features of `potential`, x fastest, that edges of `size` samples should follow.
+impl<const D: usize> SampledPotential<'_, D> {
+    /// Refuses a number of samples that is not the shape's.
+    pub(super) fn check(&self) -> Result<(), MeasureError> {
+        let (shape, found) = (self.shape, self.values.len());
+        match shape.iter().try_fold(1usize, |n, &s| n.checked_mul(s)) {
+            Some(count) if count == found => Ok(()),
+            _ => Err(MeasureError::SampleCount { shape: shape.to_vec(), found }),
+        }
+    }
+}
+
+/// The features of a potential that edges of `size` samples should follow: points at the bottom of valleys, about one a
+/// sample, in sample coordinates and in the order of their samples.
 ///
-/// Deterministic: the same at any thread count; points are in the order of their samples.
-/// Memory: two volumes of `f32` at a time, and 48 bytes (3-D) for each sample deeper than 1/4.
+/// Deterministic: the same at any thread count. Memory: two volumes of `f32` at a time, and 48 bytes (3-D) for each
+/// sample deeper than 1/4.
 ///
 /// # Errors
-/// [`MeasureError`] if there are not as many values as `shape` says, the size is not a finite
+/// [`MeasureError`] if there are not as many values as the shape says, the size is not a finite
 /// number above 0, or the watch ends the work.
 pub fn features<const D: usize>(
-    potential: &[f32],
-    shape: [usize; D],
+    potential: SampledPotential<'_, D>,
     size: f64,
     watch: &mut dyn Watch,
-) -> Result<Features<D>, MeasureError> {
-    let count = shape.iter().try_fold(1usize, |n, &s| n.checked_mul(s));
-    if count != Some(potential.len()) {
-        return Err(MeasureError::SampleCount { shape: shape.to_vec(), found: potential.len() });
-    }
+) -> Result<Vec<FeaturePoint<D>>, MeasureError> {
+    potential.check()?;
     check_size(size)?;
+    let SampledPotential { values, shape } = potential;
     let sigma = [(size / 6.0).max(1.0); D];
-    let search = Search { sigma, least_depth: LEAST_DEPTH, phase: Phase::Measure };
-    let least = if D == 2 { 4.0 * size } else { 6.0 * size * size };
-    let kept = in_large_groups(bottoms(potential, shape, &search, watch)?, shape, least);
-    Ok(Features {
-        positions: kept.iter().map(|v| v.position).collect(),
-        normals: kept.iter().map(|v| v.normal).collect(),
-    })
+    let search = ValleySearch { sigma, least_depth: LEAST_DEPTH, phase: Phase::Measure };
+    Ok(in_large_groups(bottoms(values, shape, &search, watch)?, shape, size))
 }
 
 /// Refuses a nominal distance that is no length.
@@ -58,7 +60,7 @@ pub(super) fn check_size(size: f64) -> Result<(), MeasureError> {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::geometry::dot;
+    use crate::geometry::{Point, dot};
     use crate::watch::{Cancelled, Silent};
     use std::ops::ControlFlow;
 
@@ -82,11 +84,12 @@ mod tests {
         let length = dot(&normal, &normal).sqrt();
         let normal = normal.map(|x| x / length);
         let through = std::array::from_fn(|k| 0.5 * shape[k] as f64 + 0.3);
-        let b = valley(shape, through, normal);
-        let found = features(&b, shape, 4.0, &mut Silent).unwrap();
-        assert!(found.positions.len() >= shape[1..].iter().product::<usize>() / 2);
+        let values = valley(shape, through, normal);
+        let b = SampledPotential { values: &values, shape };
+        let found = features(b, 4.0, &mut Silent).unwrap();
+        assert!(found.len() >= shape[1..].iter().product::<usize>() / 2);
         let inside = |p: &Point<D>| (0..D).all(|k| p[k] > 5.0 && p[k] < shape[k] as f64 - 6.0);
-        for (p, n) in found.positions.iter().zip(&found.normals) {
+        for FeaturePoint { position: p, normal: n, .. } in &found {
             // mirrored samples bend the valley within a kernel's reach of the border
             if inside(p) {
                 let h: f64 = (0..D).map(|k| (p[k] - through[k]) * normal[k]).sum();
@@ -114,16 +117,20 @@ mod tests {
             let along = (index / 64) as f32 - 30.0;
             *v *= (-(along / 10.0).powi(2)).exp();
         }
-        let found = features(&b, shape, 4.0, &mut Silent).unwrap();
-        assert!((20..25).contains(&found.positions.len()), "{}", found.positions.len());
-        assert!(features(&b, shape, 8.0, &mut Silent).unwrap().positions.is_empty());
+        let count = |values: &[f32], size| {
+            features(SampledPotential { values, shape }, size, &mut Silent).unwrap().len()
+        };
+        assert!((20..25).contains(&count(&b, 4.0)), "{}", count(&b, 4.0));
+        assert_eq!(count(&b, 8.0), 0);
         b.iter_mut().for_each(|v| *v *= 0.25);
-        assert!(features(&b, shape, 4.0, &mut Silent).unwrap().positions.is_empty());
+        assert_eq!(count(&b, 4.0), 0);
     }
 
     #[test]
     fn wrong_inputs_are_refused() {
-        let error = |count, size| features(&vec![0.0; count], [4, 4], size, &mut Silent).err();
+        let zeros = [0.0; 16];
+        let of = |count| SampledPotential { values: &zeros[..count], shape: [4, 4] };
+        let error = |count, size| features(of(count), size, &mut Silent).err();
         assert_eq!(
             error(15, 2.0),
             Some(MeasureError::SampleCount { shape: vec![4, 4], found: 15 })
@@ -139,7 +146,7 @@ mod tests {
                 if self.0 == 0 { ControlFlow::Break(()) } else { ControlFlow::Continue(()) }
             }
         }
-        let stopped = features(&[0.0; 16], [4, 4], 2.0, &mut Stop(4));
+        let stopped = features(of(16), 2.0, &mut Stop(4));
         assert_eq!(stopped, Err(MeasureError::Cancelled(Cancelled)));
     }
 }

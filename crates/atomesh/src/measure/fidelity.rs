@@ -80,7 +80,7 @@ pub fn fidelity<const D: usize>(
 ) -> Result<FidelityReport, MeasureError> {
     let none = MeasureError::NoCells { points: mesh.points().len() };
     let kinds = [Statistic::Mean, Statistic::Std];
-    let found = sample_placed(mesh, (frame, samples), SampleOptions::new(&kinds), watch)?;
+    let found = sample_placed(mesh, frame, samples, SampleOptions::new(&kinds), watch)?;
     let [means, deviations] = [&found.values[0], &found.values[1]];
     let weight = |i: usize| found.measures[i] * found.coverage[i];
     let weighted = |i: usize, value: f64| if weight(i) > 0.0 { weight(i) * value } else { 0.0 };

@@ -21,9 +21,9 @@ mod tests;
 
 pub use alignment::{AlignmentOptions, AlignmentReport, alignment, alignment_of_faces};
 pub use angles::{SpreadReport, WantedSize, spread};
-pub use features::{Features, features};
+pub use features::{SampledPotential, features};
 pub use fidelity::{FidelityReport, HomogeneityReport, fidelity, homogeneity};
-pub use precision::{FACET_THRESHOLD, PrecisionReport, precision};
+pub use precision::{PrecisionOptions, PrecisionReport, precision};
 pub use shape::{CellShape, ShapeReport, cell_shape, shape, shapes};
 pub use statistics::Histogram;
 

@@ -7,15 +7,16 @@
 
 use super::MeasureError;
 use super::faces::faces;
-use super::features::{Features, check_size};
+use super::features::{SampledPotential, check_size};
 use super::statistics::sums;
+use crate::crests::FeaturePoint;
 use crate::geometry::{Point, difference, dot};
 use crate::mesh::Mesh;
 use crate::watch::{Phase, Watch, check};
 use rayon::prelude::*;
 
-/// The threshold of the mean of b along a facet at which it is selected, as for picking faults.
-pub const FACET_THRESHOLD: f64 = -0.2;
+/// The mean of b along a facet at or below which it is selected, as for picking faults.
+const FACET_THRESHOLD: f64 = -0.2;
 
 /// Parts of a facet's longest edge, at most.
 const MOST_PARTS: usize = 64;
@@ -34,29 +35,43 @@ pub struct PrecisionReport {
     pub precision: Option<f64>,
 }
 
-/// The share of the facets of `mesh`, in sample coordinates, with a mean of b of at most `threshold` that lies
-/// within τ = max(1, size/10) of `features`.
+/// Which facets are selected, and how near to features they must be.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct PrecisionOptions {
+    /// The nominal distance d in samples; sets τ = max(1, d/10).
+    pub size: f64,
+    /// Facets with a mean of b at or below this are selected. Default −0.2.
+    pub threshold: f64,
+}
+
+impl PrecisionOptions {
+    /// The defaults for a nominal distance of `size` samples.
+    pub fn new(size: f64) -> Self {
+        Self { size, threshold: FACET_THRESHOLD }
+    }
+}
+
+/// How much of the selected facets of `mesh`, in sample coordinates, lies within τ of `features`.
 ///
 /// The mean of b, linear between samples, is taken over points at most a sample apart (half a sample on edges in
 /// 2-D). The same at any thread count. Cost: O(area of facets).
 ///
 /// # Errors
-/// [`MeasureError`] if there are not as many values as `shape` says, the size is no length, or the watch ends
+/// [`MeasureError`] if there are not as many values as the shape says, the size is no length, or the watch ends
 /// the work.
 pub fn precision<const D: usize>(
     mesh: &Mesh<D>,
-    (potential, shape): (&[f32], [usize; D]),
-    features: &Features<D>,
-    (size, threshold): (f64, f64),
+    potential: SampledPotential<'_, D>,
+    features: &[FeaturePoint<D>],
+    options: PrecisionOptions,
     watch: &mut dyn Watch,
 ) -> Result<PrecisionReport, MeasureError> {
+    let PrecisionOptions { size, threshold } = options;
     check_size(size)?;
-    if shape.iter().try_fold(1usize, |n, &s| n.checked_mul(s)) != Some(potential.len()) {
-        return Err(MeasureError::SampleCount { shape: shape.to_vec(), found: potential.len() });
-    }
+    potential.check()?;
     check(watch, Phase::Measure, 0.0, None)?;
     let tau = (0.1 * size).max(1.0);
-    let bins = Bins::new(features, shape, tau);
+    let bins = Bins::new(features, potential.shape, tau);
     let facets = faces::<D, D>(mesh);
     check(watch, Phase::Measure, 0.3, None)?;
     // the selected length or area, and the part of it near features, facet by facet
@@ -66,7 +81,7 @@ pub fn precision<const D: usize>(
             let corners = facet.map(|c| mesh.points()[c as usize]);
             let points = spread_over(&corners);
             let count = points.len() as f64;
-            let mean = points.iter().map(|p| linear(potential, shape, p)).sum::<f64>() / count;
+            let mean = points.iter().map(|p| linear(potential, p)).sum::<f64>() / count;
             (mean <= threshold).then(|| {
                 let measure = measure(&corners);
                 let near = points.iter().filter(|p| bins.is_near(p)).count();
@@ -124,7 +139,8 @@ fn measure<const D: usize>(corners: &[Point<D>; D]) -> f64 {
 }
 
 /// b at a point, linear between samples; beyond the image as at its rim.
-fn linear<const D: usize>(potential: &[f32], shape: [usize; D], p: &Point<D>) -> f64 {
+fn linear<const D: usize>(potential: SampledPotential<'_, D>, p: &Point<D>) -> f64 {
+    let SampledPotential { values, shape } = potential;
     let (mut start, mut stride) = (0, 1);
     let (mut strides, mut shares) = ([0; D], [0.0; D]);
     for k in 0..D {
@@ -143,14 +159,14 @@ fn linear<const D: usize>(potential: &[f32], shape: [usize; D], p: &Point<D>) ->
             index += if high { strides[k] } else { 0 };
             weight *= if high { shares[k] } else { 1.0 - shares[k] };
         }
-        sum += weight * f64::from(potential[index]);
+        sum += weight * f64::from(values[index]);
     }
     sum
 }
 
 /// Feature points by the cubes that they lie in.
 struct Bins<'a, const D: usize> {
-    features: &'a Features<D>,
+    features: &'a [FeaturePoint<D>],
     tau: f64,
     /// How far along a feature a point stands for it.
     reach: f64,
@@ -162,7 +178,7 @@ struct Bins<'a, const D: usize> {
 }
 
 impl<'a, const D: usize> Bins<'a, D> {
-    fn new(features: &'a Features<D>, shape: [usize; D], tau: f64) -> Self {
+    fn new(features: &'a [FeaturePoint<D>], shape: [usize; D], tau: f64) -> Self {
         let reach = 0.5 * (D as f64).sqrt();
         let side = tau + reach;
         let shape = shape.map(|n| (n as f64 / side) as usize + 1);
@@ -170,7 +186,7 @@ impl<'a, const D: usize> Bins<'a, D> {
         let mut bins =
             Self { features, tau, reach, side, shape, starts: vec![0; count + 1], members: vec![] };
         let cubes: Vec<usize> =
-            features.positions.iter().map(|p| bins.index(bins.cube(p))).collect();
+            features.iter().map(|point| bins.index(bins.cube(&point.position))).collect();
         for &cube in &cubes {
             bins.starts[cube + 1] += 1;
         }
@@ -215,8 +231,9 @@ impl<'a, const D: usize> Bins<'a, D> {
     }
 
     fn passes(&self, member: usize, p: &Point<D>) -> bool {
-        let v = difference(p, &self.features.positions[member]);
-        let across = dot(&v, &self.features.normals[member]);
+        let point = &self.features[member];
+        let v = difference(p, &point.position);
+        let across = dot(&v, &point.normal);
         let along = (dot(&v, &v) - across * across).max(0.0).sqrt();
         let beyond = (along - self.reach).max(0.0);
         across * across + beyond * beyond <= self.tau * self.tau
@@ -245,8 +262,9 @@ mod tests {
     fn values_between_samples_are_linear() {
         let b: Vec<f32> =
             (0..24).map(|i| (i % 4 + 10 * (i / 4 % 3) + 100 * (i / 12)) as f32).collect();
-        assert_eq!(linear(&b, [4, 3, 2], &[1.5, 0.25, 0.5]), 1.5 + 2.5 + 50.0);
-        assert_eq!(linear(&b, [4, 3, 2], &[9.0, -1.0, 1.0]), 103.0);
+        let b = SampledPotential { values: &b, shape: [4, 3, 2] };
+        assert_eq!(linear(b, &[1.5, 0.25, 0.5]), 1.5 + 2.5 + 50.0);
+        assert_eq!(linear(b, &[9.0, -1.0, 1.0]), 103.0);
     }
 
     /// Squares of 8 samples, each cut in two, over 32 × 32 samples.
@@ -264,35 +282,28 @@ mod tests {
         // b is −1 on the columns x = 8 and x = 24 of the mesh; a feature is known on the first, up to y = 15.5
         let b: Vec<f32> =
             (0..33 * 33).map(|i| if [8, 24].contains(&(i % 33)) { -1.0 } else { 0.0 }).collect();
-        let positions: Vec<Point<2>> = (0..16).map(|y| [8.2, f64::from(y)]).collect();
-        let features = Features { normals: vec![[1.0, 0.0]; 16], positions };
-        let of = |size| {
-            let b = (&b[..], [33, 33]);
-            precision(&squares(), b, &features, (size, FACET_THRESHOLD), &mut Silent).unwrap()
+        let at =
+            |y| FeaturePoint { index: 0, position: [8.2, y], normal: [1.0, 0.0], strength: 1.0 };
+        let features: Vec<FeaturePoint<2>> = (0..16).map(|y| at(f64::from(y))).collect();
+        let of = |values, size| {
+            let b = SampledPotential { values, shape: [33, 33] };
+            precision(&squares(), b, &features, PrecisionOptions::new(size), &mut Silent).unwrap()
         };
-        let report = of(8.0);
+        let report = of(&b, 8.0);
         // columns alone: rows and diagonals cross the valleys within two samples of 8 or 11
         assert_eq!((report.facets_selected, report.measure_selected), (8, 64.0));
         // the last disc ends at 15 + √2/2, and √(1 − 0.2²) beyond it is within 1: 16.69, and the last of the
         // points, which are half a sample apart, at 16.25 + ¼
         assert_eq!(report.precision, Some(16.5 / 64.0));
-        assert!(of(20.0).precision > report.precision); // τ is 2
-        let none = precision(
-            &squares(),
-            (&[0.0; 33 * 33], [33, 33]),
-            &features,
-            (8.0, FACET_THRESHOLD),
-            &mut Silent,
-        );
-        assert_eq!(none.unwrap().precision, None);
+        assert!(of(&b, 20.0).precision > report.precision); // τ is 2
+        assert_eq!(of(&[0.0; 33 * 33], 8.0).precision, None);
     }
 
     #[test]
     fn wrong_inputs_are_refused() {
-        let features = Features::default();
         let error = |count: usize, size| {
-            let b = (&vec![0.0; count][..], [4, 4]);
-            precision(&squares(), b, &features, (size, -0.2), &mut Silent).err()
+            let b = SampledPotential { values: &vec![0.0; count], shape: [4, 4] };
+            precision(&squares(), b, &[], PrecisionOptions::new(size), &mut Silent).err()
         };
         let count = MeasureError::SampleCount { shape: vec![4, 4], found: 15 };
         assert_eq!(error(15, 8.0), Some(count));

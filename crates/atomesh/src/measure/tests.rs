@@ -56,10 +56,11 @@ fn dark<const D: usize>(scene: Scene, shape: [usize; D]) -> (Vec<f32>, crate::sy
 
 fn found_features_are_the_true_ones<const D: usize>(scene: Scene, shape: [usize; D]) {
     let (b, truth) = dark(scene, shape);
-    let found = features(&b, shape, 4.0, &mut Silent).unwrap();
-    let count = found.positions.len();
+    let found = features(SampledPotential { values: &b, shape }, 4.0, &mut Silent).unwrap();
+    let count = found.len();
     assert!(count > 50, "{count} features of {scene}");
-    let mut distances: Vec<f64> = found.positions.iter().map(|p| truth.distance(p)).collect();
+    let mut distances: Vec<f64> =
+        found.iter().map(|point| truth.distance(&point.position)).collect();
     // fewer than half of the points belong to the whirls about tips, rims and crossings
     let (most, greatest) = (percentile(&mut distances, 50.0), percentile(&mut distances, 100.0));
     assert!(most < 0.1 && greatest < 4.0, "{scene}: {most} {greatest}");
@@ -81,7 +82,7 @@ fn reports<const D: usize>(scene: Scene, shape: [usize; D]) -> String {
     assert_eq!((shape_report.inverted, shape_report.flat), (0, 0));
     // pairwise sums of some ten thousand rounded sixths
     assert!(shape_report.volume_error < Some(1e-14));
-    let found = features(&b, shape, 4.0, &mut Silent).unwrap();
+    let found = features(SampledPotential { values: &b, shape }, 4.0, &mut Silent).unwrap();
     let options = AlignmentOptions { limit: 500, ..AlignmentOptions::new(4.0) };
     let aligned = alignment(&mesh, &found, &options, &mut Silent).unwrap();
     assert!(aligned.features == 500 || aligned.features == aligned.features_found);
@@ -108,6 +109,6 @@ fn features_of_the_reference_are_as_many_as_the_judge_finds() {
         .chunks_exact(4)
         .map(|c| f32::from_le_bytes([c[0], c[1], c[2], c[3]]))
         .collect();
-    let found = features(&values, [256, 256], 8.0, &mut Silent).unwrap();
-    assert_eq!(found.positions.len(), 3425);
+    let b = SampledPotential { values: &values, shape: [256, 256] };
+    assert_eq!(features(b, 8.0, &mut Silent).unwrap().len(), 3425);
 }

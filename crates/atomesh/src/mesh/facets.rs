@@ -14,17 +14,24 @@ pub struct Facet<const D: usize> {
     pub neighbour: Option<u32>,
 }
 
-/// A cell beside a facet: the facet's corners, ascending; the cell; and its corner off the facet.
-pub(super) type Side<const D: usize> = ([u32; D], u32, u32);
+/// A facet as one of its cells has it.
+#[derive(Clone, Copy, PartialEq, Eq, PartialOrd, Ord)]
+pub(super) struct HalfFacet<const D: usize> {
+    /// The facet's corners, ascending.
+    pub corners: [u32; D],
+    pub cell: u32,
+    /// The cell's corner off the facet.
+    pub apex: u32,
+}
 
 impl<const D: usize> Mesh<D> {
-    /// All facets, in lexicographic order of their corners. Facets of more than two cells, a fault
-    /// that [`Mesh::validate`] names, have the two lowest. Cost: O(cells).
+    /// All facets, in lexicographic order of their corners. Of more than two cells at a facet, a fault that
+    /// [`Mesh::validate`] names, the two lowest are given. Cost: O(cells).
     pub fn facets(&self) -> Vec<Facet<D>> {
         let mut facets = Vec::with_capacity(self.cell_count() * Self::CORNERS / 2);
-        self.each_facet(|sides| {
-            let neighbour = sides.get(1).map(|side| side.1);
-            facets.push(Facet { corners: sides[0].0, cell: sides[0].1, neighbour });
+        self.each_facet(|halves| {
+            let neighbour = halves.get(1).map(|half| half.cell);
+            facets.push(Facet { corners: halves[0].corners, cell: halves[0].cell, neighbour });
         });
         facets
     }
@@ -35,7 +42,7 @@ impl<const D: usize> Mesh<D> {
     /// counter-clockwise (3-D).
     ///
     /// # Panics
-    /// If there is no such cell or corner.
+    /// If the cell or the corner does not exist.
     pub fn facet_of(&self, cell: usize, opposite: usize) -> [u32; D] {
         let corners = &self.corners[cell * Self::CORNERS..(cell + 1) * Self::CORNERS];
         assert!(opposite <= D, "a cell has D + 1 corners");
@@ -49,48 +56,35 @@ impl<const D: usize> Mesh<D> {
     /// The facet's normal, as long as the facet is long (2-D) or large (3-D).
     ///
     /// # Panics
-    /// If a corner is no point of the mesh.
+    /// If a corner is not a point of the mesh.
     pub fn facet_normal(&self, facet: &[u32; D]) -> Point<D> {
-        const { assert!(D == 2 || D == 3) };
-        let at = |k: usize| &self.points[facet[k] as usize];
-        let mut normal = [0.0; D];
-        if D == 2 {
-            let v = difference(at(1), at(0));
-            (normal[0], normal[1]) = (v[1], -v[0]);
-        } else {
-            let (u, v) = (difference(at(1), at(0)), difference(at(2), at(0)));
-            for k in 0..D {
-                let (i, j) = ((k + 1) % D, (k + 2) % D);
-                normal[k] = (u[i] * v[j] - u[j] * v[i]) / 2.0;
-            }
-        }
-        normal
+        area_vector(&facet.map(|corner| self.points[corner as usize]))
     }
 
-    /// Calls `visit` with the cells beside each facet, ascending, facet after facet in lexicographic
-    /// order.
-    pub(super) fn each_facet(&self, mut visit: impl FnMut(&[Side<D>])) {
+    /// Calls `visit` with each facet as all of its cells have it, by ascending cells; facets come in lexicographic order.
+    pub(super) fn each_facet(&self, mut visit: impl FnMut(&[HalfFacet<D>])) {
         let cells = self.cells_of_points();
-        let mut sides: Vec<Side<D>> = Vec::new();
+        let mut halves: Vec<HalfFacet<D>> = Vec::new();
         for point in 0..self.points.len() as u32 {
-            sides.clear();
+            halves.clear();
             for &cell in cells.of(point) {
-                self.sides_led_by(point, cell, &mut sides);
+                self.facets_led_by(point, cell, &mut halves);
             }
-            sides.sort_unstable();
-            sides.chunk_by(|a, b| a.0 == b.0).for_each(&mut visit);
+            halves.sort_unstable();
+            halves.chunk_by(|a, b| a.corners == b.corners).for_each(&mut visit);
         }
     }
 
     /// Appends the facets of a cell whose lowest corner is `point`.
-    fn sides_led_by(&self, point: u32, cell: u32, sides: &mut Vec<Side<D>>) {
+    fn facets_led_by(&self, point: u32, cell: u32, halves: &mut Vec<HalfFacet<D>>) {
         let at = cell as usize * Self::CORNERS;
         let corners = &self.corners[at..at + Self::CORNERS];
         for (skip, &apex) in corners.iter().enumerate() {
-            let mut facet: [u32; D] = std::array::from_fn(|k| corners[k + usize::from(k >= skip)]);
-            facet.sort_unstable();
-            if facet[0] == point {
-                sides.push((facet, cell, apex));
+            let mut corners: [u32; D] =
+                std::array::from_fn(|k| corners[k + usize::from(k >= skip)]);
+            corners.sort_unstable();
+            if corners[0] == point {
+                halves.push(HalfFacet { corners, cell, apex });
             }
         }
     }
@@ -114,8 +108,8 @@ impl<const D: usize> Mesh<D> {
         CellsOfPoints { starts, cells }
     }
 
-    /// The cells that have all corners of `facet`, ascending: one or two in a valid mesh, none if this
-    /// is no facet of it.
+    /// The cells that have all corners of `facet`, ascending: one or two for a facet of a valid mesh, none for other
+    /// corners.
     pub fn cells_beside<'a>(
         &'a self,
         facet: &'a [u32; D],
@@ -139,7 +133,7 @@ pub struct CellsOfPoints {
 }
 
 impl CellsOfPoints {
-    /// The cells of a point, ascending; none if there is no such point.
+    /// The cells of a point, ascending; none if the point does not exist.
     #[inline]
     pub fn of(&self, point: u32) -> &[u32] {
         match self.starts.get(point as usize..point as usize + 2) {
@@ -147,6 +141,21 @@ impl CellsOfPoints {
             _ => &[],
         }
     }
+}
+
+/// The normal of a segment or triangle, as long as the segment is long or the triangle large: to the right of a
+/// segment from its first point to its second, on the side from which a triangle's points run counter-clockwise.
+pub(crate) fn area_vector<const D: usize>(corners: &[Point<D>; D]) -> Point<D> {
+    const { assert!(D == 2 || D == 3) };
+    let u = difference(&corners[1], &corners[0]);
+    if D == 2 {
+        return std::array::from_fn(|k| if k == 0 { u[1] } else { -u[0] });
+    }
+    let v = difference(&corners[D - 1], &corners[0]);
+    std::array::from_fn(|k| {
+        let (a, b) = ((k + 1) % D, (k + 2) % D);
+        0.5 * (u[a] * v[b] - u[b] * v[a])
+    })
 }
 
 #[cfg(test)]

@@ -1,21 +1,33 @@
-//! Triangle and tetrahedral meshes, and how points are connected to make them.
+//! Meshes: of triangles or tetrahedra ([`Mesh`]), of their second order ([`Quadratic`]), of polygons or polyhedra
+//! ([`PolyMesh`]), with named groups of facets and cells ([`Tags`]). [`Delaunay`] connects points to make them.
 
 mod delaunay;
 mod facets;
+mod poly_mesh;
 mod quadratic;
 mod tags;
 mod validate;
 
-use crate::geometry::Simplex;
+use crate::geometry::{Point, Simplex};
 pub(crate) use delaunay::MOST_POINTS;
 pub use delaunay::{ConnectError, Delaunay, merge_duplicates};
+pub(crate) use facets::area_vector;
 pub use facets::{CellsOfPoints, Facet};
+pub(crate) use poly_mesh::mean_distance;
+pub use poly_mesh::{
+    BoundaryConnection, Connection, PolyFault, PolyMesh, PolyParts, PolyReport,
+    boundary_connections, connections,
+};
 pub use quadratic::Quadratic;
 use rayon::prelude::*;
-pub use tags::{FacetGroup, Regions, Tags, TagsError};
+pub(crate) use tags::sides_of;
+pub use tags::{
+    FacetGroup, MASK_NAME, Regions, Tags, TagsError, feature_name, interface_name, is_feature_name,
+    region_name, side_name,
+};
 pub use validate::MeshFault;
 
-/// What is wrong with a mesh's parts.
+/// Why points and corners do not make a mesh.
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]
 #[non_exhaustive]
 pub enum MeshError {
@@ -109,7 +121,7 @@ impl<const D: usize> Mesh<D> {
     /// A cell, given as its corners, with the coordinates of its points.
     ///
     /// # Panics
-    /// If `cell` has other than `D + 1` corners, or names points that the mesh has not.
+    /// If `cell` has other than `D + 1` corners, or names a point that does not exist.
     pub fn simplex(&self, cell: &[u32]) -> Simplex<D> {
         assert_eq!(cell.len(), Self::CORNERS, "a cell has D + 1 corners");
         let at = |k: usize| self.points[cell[k] as usize];
@@ -124,19 +136,36 @@ impl<const D: usize> Mesh<D> {
     /// The sum of the cells' areas (2-D) or volumes (3-D), added with compensation (Neumaier 1974):
     /// the rounding error does not grow with the number of cells.
     pub fn measure(&self) -> f64 {
-        let (mut sum, mut lost) = (0.0_f64, 0.0);
-        for simplex in self.simplices() {
-            let term = simplex.measure();
-            let total = sum + term;
-            let (large, small) = if sum.abs() >= term.abs() { (sum, term) } else { (term, sum) };
-            lost += (large - total) + small;
-            sum = total;
+        compensated_sum(self.simplices().map(|simplex| simplex.measure()))
+    }
+
+    /// The mesh with its points moved by an affine map, its cells turned over if the map mirrors.
+    ///
+    /// # Panics
+    /// If a point is moved to where a coordinate is not finite.
+    pub fn moved(&self, mirrored: bool, to: impl Fn(&Point<D>) -> Point<D> + Sync) -> Self {
+        let points = self.points.par_iter().with_min_len(1 << 10).map(&to).collect();
+        let mut corners = self.corners.clone();
+        if mirrored {
+            corners.chunks_exact_mut(Self::CORNERS).for_each(|cell| cell.swap(D - 1, D));
         }
-        sum + lost
+        Self::new(points, corners).expect("the map keeps points finite")
     }
 
     /// The points and the corners.
     pub fn into_parts(self) -> (Vec<[f64; D]>, Vec<u32>) {
         (self.points, self.corners)
     }
+}
+
+/// The sum of numbers, added with compensation (Neumaier 1974): the rounding error does not grow with their count.
+fn compensated_sum(terms: impl Iterator<Item = f64>) -> f64 {
+    let (mut sum, mut lost) = (0.0_f64, 0.0);
+    for term in terms {
+        let total = sum + term;
+        let (large, small) = if sum.abs() >= term.abs() { (sum, term) } else { (term, sum) };
+        lost += (large - total) + small;
+        sum = total;
+    }
+    sum + lost
 }

@@ -1,9 +1,8 @@
 //! Cells of second order: a mesh with a node in the middle of every edge.
 //!
-//! Nodes are the mesh's points, in their order, then the middles of its edges, in lexicographic order of
-//! their ends. Cells are straight until [`Quadratic::curve`] moves middles; a cell then stays valid as long
-//! as the determinant of its map is positive, a polynomial of degree D that is tested on a lattice of places
-//! fine enough to hold it.
+//! Nodes are the mesh's points, in their order, then the middles of its edges, in lexicographic order of their ends.
+//! Cells are straight until [`Quadratic::curve`] moves middles. A cell is valid as long as the determinant of its map is
+//! positive: a polynomial of degree D, tested on a lattice of points fine enough to determine it.
 
 use super::Mesh;
 use crate::geometry::{Point, Simplex};
@@ -11,7 +10,7 @@ use crate::geometry::{Point, Simplex};
 /// The edges of a cell in the order of their nodes, which is VTK's: of a triangle the first three.
 const EDGES: [[usize; 2]; 6] = [[0, 1], [1, 2], [2, 0], [0, 3], [1, 3], [2, 3]];
 
-/// The least determinant of a curved cell's map, over that of the straight cell.
+/// Least determinant of a curved cell's map, over that of the straight cell.
 const LEAST_SHARE: f64 = 0.2;
 
 /// A mesh of 6-node triangles or 10-node tetrahedra.
@@ -71,7 +70,7 @@ impl<const D: usize> Quadratic<D> {
         Some((self.point_count + at) as u32)
     }
 
-    /// Values at the points, and at middles the mean of the values at their ends.
+    /// The values at the points, followed by those at the middles of edges, the mean of the values at their ends.
     ///
     /// # Panics
     /// If there is not one value for each point.
@@ -89,8 +88,8 @@ impl<const D: usize> Quadratic<D> {
         corners.iter().copied().chain(edges.iter().filter_map(middle)).collect()
     }
 
-    /// Moves the middles of the edges of `facets` to where `place` puts them, if it does, and puts back those
-    /// of cells whose map would not stay well invertible. Returns how many stay where they were put.
+    /// Moves the middles of the edges of `facets` to where `place` says, if anywhere, and puts back those of cells whose
+    /// map would not stay invertible (see the module). Returns the number of middles that stay moved.
     pub fn curve(
         &mut self,
         facets: &[[u32; D]],
@@ -108,8 +107,7 @@ impl<const D: usize> Quadratic<D> {
                 moved.push((node, straight));
             }
         }
-        // a cell that fails is made straight; its neighbours lose a bend, and never fail for it alone, but are
-        // looked at again
+        // a cell that fails is made straight, and its neighbours, which lose a bend, are tested again
         loop {
             let bad: Vec<u32> = self
                 .cells

@@ -1,13 +1,13 @@
 //! What a mesh promises, checked by exact arithmetic.
 
 use super::Mesh;
-use super::facets::Side;
+use super::facets::HalfFacet;
 
 /// The first promise that a mesh breaks.
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]
 #[non_exhaustive]
 pub enum MeshFault {
-    /// A cell is flat or inside out.
+    /// A cell is flat or inverted.
     #[error(
         "cell {cell} with corners {corners:?} has the measure {measure:e}; expected it positive"
     )]
@@ -35,8 +35,8 @@ pub enum MeshFault {
         /// The cells.
         cells: [usize; 2],
     },
-    /// A point is no corner of any cell.
-    #[error("point {point} is no corner of any cell")]
+    /// A point is not a corner of any cell.
+    #[error("point {point} is not a corner of any cell")]
     Unused {
         /// The point's index.
         point: usize,
@@ -69,9 +69,9 @@ impl<const D: usize> Mesh<D> {
             }
         }
         let mut fault = None;
-        self.each_facet(|sides| {
+        self.each_facet(|halves| {
             if fault.is_none() {
-                fault = self.fault_of(sides);
+                fault = self.fault_of(halves);
             }
         });
         if let Some(fault) = fault {
@@ -88,24 +88,24 @@ impl<const D: usize> Mesh<D> {
     }
 
     /// What is wrong with the cells beside a facet, all of positive orientation.
-    fn fault_of(&self, sides: &[Side<D>]) -> Option<MeshFault> {
-        let facet = sides[0].0.to_vec();
-        match sides {
+    fn fault_of(&self, halves: &[HalfFacet<D>]) -> Option<MeshFault> {
+        let facet = halves[0].corners.to_vec();
+        match halves {
             [_] => None,
             [a, b] if self.is_above(a) == self.is_above(b) => {
-                Some(MeshFault::Overlap { facet, cells: [a.1 as usize, b.1 as usize] })
+                Some(MeshFault::Overlap { facet, cells: [a.cell as usize, b.cell as usize] })
             }
             [_, _] => None,
-            _ => Some(MeshFault::Crowded { facet, count: sides.len() }),
+            _ => Some(MeshFault::Crowded { facet, count: halves.len() }),
         }
     }
 
-    /// Whether facet and apex, in this order, have the orientation of the cell: an even number of
-    /// swaps leads from one to the other.
-    fn is_above(&self, side: &Side<D>) -> bool {
-        let at = side.1 as usize * Self::CORNERS;
+    /// Whether the facet's corners followed by the apex have the orientation of the cell: they are an even permutation of
+    /// its corners.
+    fn is_above(&self, half: &HalfFacet<D>) -> bool {
+        let at = half.cell as usize * Self::CORNERS;
         let corners = &self.corners[at..at + Self::CORNERS];
-        let rank = |corner: &u32| side.0.iter().position(|c| c == corner).unwrap_or(D);
+        let rank = |corner: &u32| half.corners.iter().position(|c| c == corner).unwrap_or(D);
         let swaps: usize = (0..corners.len())
             .map(|k| corners[..k].iter().filter(|c| rank(c) > rank(&corners[k])).count())
             .sum();
@@ -120,9 +120,9 @@ impl<const D: usize> Mesh<D> {
     /// [`MeshFault::NotDelaunay`] for the first facet that fails.
     pub fn check_delaunay(&self) -> Result<(), MeshFault> {
         let mut fault = None;
-        self.each_facet(|sides| {
-            let [(_, cell, _), (_, _, apex)] = sides else { return };
-            let (cell, point) = (*cell as usize, *apex as usize);
+        self.each_facet(|halves| {
+            let [one, other] = halves else { return };
+            let (cell, point) = (one.cell as usize, other.apex as usize);
             let at = cell * Self::CORNERS;
             let simplex = self.simplex(&self.corners[at..at + Self::CORNERS]);
             if fault.is_none() && simplex.in_sphere(&self.points[point]) > 0.0 {

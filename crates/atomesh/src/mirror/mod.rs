@@ -1,47 +1,42 @@
 //! Atoms in mirrored pairs across features that repel, so that faces of Voronoi cells fall on the features.
 //!
-//! A feature that repels (b above 0) keeps atoms off, but does not make those on its two sides stand opposite
-//! each other, and only of atoms that do is the feature the bisector. In space hardly any do by themselves. So
-//! places are chosen on the features, and at each a pair of atoms, as grids that conform to faults have it
-//! (Merland and others 2014; Berge, Klemetsdal & Lie 2019). In this order:
+//! A feature that repels (b above 0) keeps atoms off. Those on its two sides need not stand opposite each other,
+//! though, and only where they do is the feature their bisector. In space hardly any do by themselves. So sites are
+//! chosen on the features, and each gets a pair of atoms, as in grids that conform to faults (Merland and others 2014;
+//! Berge, Klemetsdal & Lie 2019). In this order:
 //!
-//! 1. `crests`: the bottoms of the valleys of −b, with their normals;
-//! 2. `feet`: places on them about 0.85 d apart, evened out as the centroids of what is nearest to each;
-//! 3. `pairs`: an atom 0.35 d to either side of each. Where another pair has an atom there already, as where
+//! 1. crests of b, with their normals ([`crate::crests::repelling_crests`]);
+//! 2. sites on them about 0.85 d apart (`crests::sites`);
+//! 3. `pairs`: an atom 0.35 d to either side of each site. Where another pair has an atom there already, as where
 //!    features meet, it serves both, and its mirror image is the second;
-//! 4. `room`: other atoms that are too near, or would be nearest to a part of a feature, are taken out;
-//! 5. holes are filled, and the others settle by the pair potential around the pairs, which stay. Where all of
-//!    the image repels it has no other part in this: the pairs follow it, and b would only crowd the rest.
+//! 4. `exclusion`: other atoms that are too near, or would be nearest to a part of a feature, are taken out;
+//! 5. holes are filled, and the other atoms settle by the pair potential around the pairs, which stay. Where all of the
+//!    image repels, b has no other part in this: the pairs follow it, and it would only crowd the other atoms.
 //!
-//! Nothing is random but the perturbation of step 5. Deterministic: the same at any thread count. Cost: that of
-//! looking for valleys, O(points on features), and that of moving the atoms.
+//! Nothing is random but the perturbation of step 5. Deterministic: the same at any thread count. Cost: that of finding
+//! crests, O(points on features), and that of moving the atoms.
 
-mod bins;
-mod crests;
-mod feet;
+mod exclusion;
 mod pairs;
-mod room;
-
-pub use crests::{Crest, crests};
 
 use rayon::prelude::*;
 
-use crate::fields::Fields;
-use crate::fields::ImageWeight;
+use crate::crests::{FeaturePoint, sites};
+use crate::fields::{Fields, ImageWeight};
 use crate::lattice::{Lattice, LatticeError, Scatterer, fill_holes};
 use crate::optimize::{OptimizeError, OptimizeOptions, OptimizeReport, optimize};
 use crate::watch::{Cancelled, Phase, Watch, check};
 
+use exclusion::Exclusion;
 use pairs::Pairs;
-use room::Room;
 
 /// The least distance between two atoms of pairs that are not opposite each other, and between the two of one, over
 /// d: nearer atoms would have cells much smaller than others. On the paper's figure 1 recall is the same from 0.4
 /// to 0.5, and less with 0.6.
 const APART: f64 = 0.45;
-/// How near to the atoms of pairs others may be, over d: before they settle, and after.
+/// The least distance of other atoms from those of pairs, over d: before they settle, and after.
 const CLEAR: [f64; 2] = [0.7, 0.4];
-/// Meshes that are looked at for holes.
+/// How often holes are looked for and filled.
 const FILL_ROUNDS: usize = 2;
 
 /// Why there are no pairs.
@@ -81,17 +76,17 @@ impl From<OptimizeError> for MirrorError {
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, serde::Serialize)]
 #[non_exhaustive]
 pub struct MirrorReport {
-    /// Places on features that were to have a pair of atoms.
+    /// Sites on features that were to have a pair of atoms.
     pub places: usize,
-    /// Places that have one.
+    /// Sites that have one.
     pub pairs: usize,
-    /// Pairs with an atom that another pair has too.
+    /// Pairs that share an atom with another pair.
     pub shared: usize,
 }
 
-/// A lattice with pairs, and how it came about.
+/// A lattice with mirrored pairs, and how it came about.
 #[derive(Clone, Debug)]
-pub struct Mirrored<const D: usize> {
+pub struct MirroredLattice<const D: usize> {
     /// The atoms; those of pairs are frozen.
     pub lattice: Lattice<D>,
     /// The pairs.
@@ -100,10 +95,19 @@ pub struct Mirrored<const D: usize> {
     pub optimize_report: OptimizeReport,
 }
 
-/// Puts pairs of atoms on both sides of the crests, and lets the others settle around them.
+/// How atoms settle around the pairs.
+#[derive(Clone, Copy)]
+pub struct Settling<'a, const D: usize> {
+    /// Finds the holes that removed atoms leave.
+    pub scatterer: &'a Scatterer<D>,
+    /// How atoms move, but for the stages with a smoothed image, which are left out.
+    pub options: &'a OptimizeOptions,
+}
+
+/// Puts pairs of atoms on both sides of the features that `crests` are on, in lattice coordinates, and lets the others
+/// settle around them.
 ///
-/// Atoms that are frozen already, such as wells, stay; pairs are made with them where they are near enough to a
-/// feature. `options` say how the others settle, but for the stages with a smoothed image, which are left out.
+/// Atoms that are frozen already, such as wells, stay; pairs are made with them where they are near enough to a feature.
 ///
 /// Reports [`Phase::Grow`] and [`Phase::Optimize`] to `watch`.
 ///
@@ -111,31 +115,38 @@ pub struct Mirrored<const D: usize> {
 /// [`MirrorError`] if the atoms cannot be connected or moved, or `watch` ends the work.
 pub fn mirror<const D: usize>(
     lattice: Lattice<D>,
-    crests: &[Crest<D>],
+    crests: &[FeaturePoint<D>],
     fields: Fields<'_, D>,
-    (scatterer, options): (&Scatterer<D>, &OptimizeOptions),
+    settling: Settling<'_, D>,
     watch: &mut dyn Watch,
-) -> Result<Mirrored<D>, MirrorError> {
+) -> Result<MirroredLattice<D>, MirrorError> {
     let (bounds, distance) = (*lattice.bounds(), fields.distance);
     check(watch, Phase::Grow, 0.0, None)?;
-    let feet = feet::feet(crests, distance, &bounds, watch)?;
-    let pairs = Pairs::new(&feet, &lattice, distance);
-    let room = Room::new(crests, &pairs, distance, &bounds);
-    let report = MirrorReport { places: feet.len(), pairs: pairs.feet.len(), shared: pairs.shared };
-    let mut lattice = cleared(lattice, &room, CLEAR[0]);
-    pairs.new_sites().iter().for_each(|&site| lattice.push(site, ((1 << D) - 1) as u8, 0.0));
-    let lattice = fill_holes(scatterer, lattice, distance, FILL_ROUNDS, watch)?.along_curve();
+    let sites = sites(crests, distance, &bounds, watch)?;
+    let pairs = Pairs::new(&sites, &lattice, distance);
+    let exclusion = Exclusion::new(crests, &pairs, distance, &bounds);
+    let report =
+        MirrorReport { places: sites.len(), pairs: pairs.sites.len(), shared: pairs.shared };
+    let mut lattice = without_excluded(lattice, &exclusion, CLEAR[0]);
+    pairs.new_atoms().iter().for_each(|&atom| lattice.push(atom, ((1 << D) - 1) as u8, 0.0));
+    let lattice = fill_holes(settling.scatterer, lattice, distance, FILL_ROUNDS, watch)?;
+    let lattice = lattice.along_curve();
     let none = ImageWeight::constant(0.0).expect("0 is a weight");
     let weight = if fields.potential.range().0 < 0.0 { fields.weight } else { &none };
-    let options = OptimizeOptions { smoothing_steps: 0, ..options.clone() };
+    let options = OptimizeOptions { smoothing_steps: 0, ..settling.options.clone() };
     let settled = optimize(lattice, Fields { weight, ..fields }, &options, watch)?;
     let (lattice, optimize_report) = settled.into_parts();
-    Ok(Mirrored { lattice: cleared(lattice, &room, CLEAR[1]), report, optimize_report })
+    let lattice = without_excluded(lattice, &exclusion, CLEAR[1]);
+    Ok(MirroredLattice { lattice, report, optimize_report })
 }
 
-/// The lattice without the atoms that may move and are where only pairs should be.
-fn cleared<const D: usize>(lattice: Lattice<D>, room: &Room<'_, D>, clear: f64) -> Lattice<D> {
-    let stays = |i: usize| is_held(&lattice, i) || room.is_free(&lattice.atoms()[i], clear);
+/// The lattice without those atoms that may move and are where only pairs may be.
+fn without_excluded<const D: usize>(
+    lattice: Lattice<D>,
+    exclusion: &Exclusion<'_, D>,
+    clear: f64,
+) -> Lattice<D> {
+    let stays = |i: usize| is_held(&lattice, i) || exclusion.allows(&lattice.atoms()[i], clear);
     let stays: Vec<bool> = (0..lattice.len()).into_par_iter().map(stays).collect();
     lattice.retained(|i| stays[i])
 }

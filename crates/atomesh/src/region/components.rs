@@ -1,11 +1,11 @@
-//! The parts into which facets cut a mesh.
+//! The parts into which facets cut a mesh: its connected components.
 
 use crate::geometry::Sets;
 use crate::mesh::Mesh;
 
-/// For each cell the part that it belongs to, numbered from 1 in the order of their first cells: two cells are
-/// of one part if a path through facets leads from one to the other and passes none of `walls` (corners in
-/// any order). Cost: O(cells).
+/// The number of the part that each cell belongs to, from 1 on in the order of the parts' first cells. Two cells are of
+/// one part if a path through facets leads from one to the other without crossing any of `walls` (corners in any
+/// order). Cost: O(cells).
 ///
 /// ```
 /// use atomesh::{mesh::Mesh, region::components};
@@ -48,7 +48,7 @@ mod tests {
         assert_eq!(components(&mesh, &[]), [1; 6]);
         assert_eq!(components(&mesh, &[[3, 2]]), [1, 1, 2, 2, 2, 2]);
         assert_eq!(components(&mesh, &[[2, 3], [4, 5]]), [1, 1, 2, 2, 3, 3]);
-        // on the hull there is nobody behind the wall
+        // behind a wall on the hull there is no cell
         assert_eq!(components(&mesh, &[[0, 2], [0, 1]]), [1; 6]);
     }
 }

@@ -1,6 +1,6 @@
 //! Cells by the labels of an image.
 //!
-//! Which label a cell has is for `sample` to say; here is what follows from labels: islands, interfaces.
+//! `sample` says which label a cell has; here is what follows from labels: islands and interfaces.
 
 use rayon::prelude::*;
 
@@ -25,11 +25,10 @@ pub fn label_samples(samples: &Samples) -> Result<Vec<i32>, RegionError> {
     labels.into_iter().collect()
 }
 
-/// Gives cells of islands, groups of fewer than `least` cells of one label that hang together by facets, the
-/// label of the neighbour with which they share most facets (the least label of those that share as many).
-/// Returns how many cells have another label now. Groups are found once: what an island joins may still be
-/// one.
-pub fn islands<const D: usize>(mesh: &Mesh<D>, labels: &mut [i32], least: usize) -> usize {
+/// Gives the cells of islands, groups of fewer than `least` cells of one label connected by facets, the label with
+/// which the island shares most facets (of equal ones the least). Returns how many cells have another label now.
+/// Groups are found once: what an island joins may be an island itself.
+pub fn join_islands<const D: usize>(mesh: &Mesh<D>, labels: &mut [i32], least: usize) -> usize {
     let facets = mesh.facets();
     let pairs: Vec<(u32, u32)> =
         facets.iter().filter_map(|f| f.neighbour.map(|other| (f.cell, other))).collect();
@@ -42,7 +41,7 @@ pub fn islands<const D: usize>(mesh: &Mesh<D>, labels: &mut [i32], least: usize)
     let roots = groups.roots();
     let mut sizes = vec![0_usize; labels.len()];
     roots.iter().for_each(|&r| sizes[r as usize] += 1);
-    // the island, a label beside it: once for each facet
+    // an island and a label beside it, once for each facet between them
     let mut shores: Vec<(u32, i32)> = Vec::new();
     for &(a, b) in &pairs {
         for (cell, other) in [(a, b), (b, a)] {
@@ -68,11 +67,16 @@ pub fn islands<const D: usize>(mesh: &Mesh<D>, labels: &mut [i32], least: usize)
     changed
 }
 
-/// Facets between cells of one label and another: the labels, the lesser first, and the facets, corners
-/// ascending, in lexicographic order; pairs ascending.
-pub type Interface<const D: usize> = ([i32; 2], Vec<[u32; D]>);
+/// The facets between the cells of two labels.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub struct Interface<const D: usize> {
+    /// The labels, the lower first.
+    pub labels: [i32; 2],
+    /// The facets, corners ascending, in lexicographic order.
+    pub facets: Vec<[u32; D]>,
+}
 
-/// The interfaces between cells of different labels.
+/// The interfaces between cells of different labels, by ascending labels.
 ///
 /// # Panics
 /// If there are not as many labels as cells.
@@ -87,7 +91,10 @@ pub fn interfaces<const D: usize>(mesh: &Mesh<D>, labels: &[i32]) -> Vec<Interfa
     found.sort_unstable();
     found
         .chunk_by(|a, b| a.0 == b.0)
-        .map(|group| (group[0].0, group.iter().map(|f| f.1).collect()))
+        .map(|group| Interface {
+            labels: group[0].0,
+            facets: group.iter().map(|(_, facet)| *facet).collect(),
+        })
         .collect()
 }
 
@@ -120,9 +127,9 @@ mod tests {
         // the cells between x = 4 and 5 are one of each: their diagonals are the interface
         let found = interfaces(&mesh, &labels);
         assert_eq!(found.len(), 1);
-        assert_eq!(found[0].0, [-2, 7]);
-        let diagonals = found[0].1.iter().filter(|[a, b]| b - a == 10).count();
-        assert_eq!((found[0].1.len(), diagonals), (7, 4));
+        assert_eq!(found[0].labels, [-2, 7]);
+        let diagonals = found[0].facets.iter().filter(|[a, b]| b - a == 10).count();
+        assert_eq!((found[0].facets.len(), diagonals), (7, 4));
         labels.fill(3);
         assert_eq!(interfaces(&mesh, &labels), []);
     }
@@ -134,12 +141,12 @@ mod tests {
         let calm = labels.clone();
         labels[0] = 5;
         labels[10] = 5;
-        assert_eq!(islands(&mesh, &mut labels, 1), 0);
-        assert_eq!(islands(&mesh, &mut labels, 2), 2);
+        assert_eq!(join_islands(&mesh, &mut labels, 1), 0);
+        assert_eq!(join_islands(&mesh, &mut labels, 2), 2);
         assert_eq!(labels, calm);
         // no neighbour to join
         let mut alone = vec![4; mesh.cell_count()];
-        assert_eq!(islands(&mesh, &mut alone, 1000), 0);
+        assert_eq!(join_islands(&mesh, &mut alone, 1000), 0);
     }
 
     #[test]

@@ -1,26 +1,28 @@
 //! Which part of the box is meshed, and to which region each cell belongs.
 //!
 //! - [`Outline`]: the smooth outline of a mask. Atoms are drawn to it, grown on it, and put onto it.
-//! - [`trim`]: drops the cells outside of the outline, so that what is left has a manifold boundary on it.
-//! - [`smooth`]: moves points at and near the outline to better places on it, and fits facets to it.
-//! - [`interfaces`] between cells of different labels, and [`islands`] of few cells among others.
-//! - [`components`]: the parts into which facets cut a mesh.
+//! - [`trim_to_outline`] drops the cells outside of the outline; the boundary of what is left is a manifold.
+//! - [`smooth_outline`] moves points on and beside the outline to better places, [`fit_facets`] makes up for what facets
+//!   cut off.
+//! - [`interfaces`] lie between cells of different labels; [`join_islands`] removes small groups of cells.
+//! - [`components`] are the parts into which facets cut a mesh.
 //!
-//! A mask stands above the lattice, which grows on it; labels need but a mesh.
+//! Outlines come before the lattice, which grows on them; labels need only a mesh.
 
-mod carve;
+mod adjust;
 mod components;
 mod labels;
+mod manifold;
 mod outline;
-mod smooth;
+mod regularity;
 mod trim;
 
+pub use adjust::{fit_facets, smooth_outline};
 pub use components::components;
-pub use labels::{interfaces, islands, label_samples};
+pub use labels::{Interface, interfaces, join_islands, label_samples};
 pub use outline::Outline;
-pub use smooth::{fit, smooth};
 pub(crate) use trim::free_axes;
-pub use trim::{Trimmed, outline_facets, trim};
+pub use trim::{Trimmed, outline_facets, trim_to_outline};
 
 use crate::fields::DistanceError;
 use crate::fields::FieldError;
@@ -37,7 +39,7 @@ pub enum RegionError {
         /// How many there are.
         count: usize,
     },
-    /// What is inside of a mask is smaller than a cell.
+    /// The inside of a mask is smaller than a cell.
     #[error(
         "no cell of nominal distance {distance} fits into the mask; expected a mask that is thicker, or \
          a smaller distance"
@@ -46,7 +48,7 @@ pub enum RegionError {
         /// The least nominal distance.
         distance: f64,
     },
-    /// A sample is infinite or NaN.
+    /// A sample is not finite.
     #[error("sample {index} is {value}; expected a finite number")]
     NotFinite {
         /// The sample's index, x fastest.
@@ -62,7 +64,7 @@ pub enum RegionError {
         /// Its value.
         value: f64,
     },
-    /// The mask has an odd place in lattice space.
+    /// The distance from the mask cannot be computed on its grid.
     #[error(transparent)]
     Distance(#[from] DistanceError),
     /// The mask makes no field.

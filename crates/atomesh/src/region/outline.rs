@@ -1,10 +1,10 @@
 //! The outline of a mask: where the smoothed mask passes through one half.
 //!
-//! A binary mask is a staircase; smoothed by a Gaussian of σ = max(step, d/4) along each axis it has smooth
-//! level sets. The level near one half is taken that holds as much as the mask does, and the shares are
-//! shifted so that it is one half. It differs from the mask's own boundary by about σ²/2 times the curvature
-//! there less its mean, far less than d. The logit of the smoothed mask is nearly linear in the distance from a
-//! straight edge, so that Newton's method finds the nearest outline in two or three steps.
+//! A binary mask is a staircase. Smoothed by a Gaussian of σ = max(step, d/4) along each axis it has smooth level sets.
+//! Of the levels near one half, that is taken which holds as much as the mask does, and the shares are shifted so that
+//! it is one half. The outline differs from the mask's own boundary by about σ²/2 times (curvature − mean curvature),
+//! far less than d. The logit of the smoothed mask is nearly linear in the distance from a straight edge, so that
+//! Newton's method finds the nearest outline in two or three steps.
 
 use crate::fields::NominalDistance;
 use crate::fields::{Interpolation, ScalarField};
@@ -14,14 +14,14 @@ use crate::watch::{Phase, Watch, check};
 
 use super::RegionError;
 
-/// Standard deviation of the smoothing, over the least nominal distance: a staircase of single samples
-/// vanishes below an edge, and what an edge can show stays.
+/// Standard deviation of the smoothing, over the least nominal distance: steps of single samples vanish, and what is as
+/// large as an edge stays.
 const SMOOTH: f64 = 0.25;
 
-/// How far beyond the mask atoms are wanted, over the nominal distance: one layer.
+/// How far beyond the mask atoms are needed, over the nominal distance: one layer.
 const MARGIN: f64 = 1.1;
 
-/// Newton steps; two or three do.
+/// Newton steps at most; two or three suffice.
 const STEP_LIMIT: usize = 30;
 
 /// The outline of a mask, in lattice space, and what lies inside of it.
@@ -30,19 +30,19 @@ pub struct Outline<const D: usize> {
     /// The smoothed and shifted mask, 0…1.
     share: ScalarField<D>,
     bounds: Bounds<D>,
-    /// The distance from the mask and `offset` more, up to some nominal distances.
+    /// `offset` plus the distance from the mask, up to some nominal distances.
     beyond: NominalDistance<D>,
     offset: f64,
     sample_share: f64,
 }
 
 impl<const D: usize> Outline<D> {
-    /// The outline of an image that is a mask: nonzero is inside, or, where the values are shares within
-    /// 0…1, at least one half. `None` if all of it is inside: the mesh fills the box.
+    /// The outline of a mask: samples that are not 0 are inside, or, if all are shares within 0…1, those of at least one
+    /// half. `None` if all samples are inside: the mesh fills the box.
     ///
     /// # Errors
-    /// [`RegionError::EmptyMask`] if no sample is inside, [`RegionError::NotFinite`] if one is no finite
-    /// number, [`RegionError::Cancelled`].
+    /// [`RegionError::EmptyMask`] if no sample is inside, [`RegionError::NotFinite`] if one is not
+    /// finite, [`RegionError::Cancelled`].
     pub fn new(
         mask: &Image<D>,
         grid: Grid<D>,
@@ -85,8 +85,8 @@ impl<const D: usize> Outline<D> {
         self.share(p) > 0.5
     }
 
-    /// Whether an atom at `p`, where the nominal distance is `d`, has a part in the mesh of the mask:
-    /// inside, or one layer beyond.
+    /// Whether the mesh of the mask needs an atom at `p`, where the nominal distance is `d`: inside, or within one layer
+    /// beyond.
     pub fn needs(&self, p: &Point<D>, d: f64) -> bool {
         self.beyond.at(p) - self.offset <= MARGIN * d
     }
@@ -116,7 +116,7 @@ impl<const D: usize> Outline<D> {
         self.sample_share
     }
 
-    /// The logit of the smoothed mask and its gradient along the axes that `freedom` names.
+    /// The logit of the smoothed mask, and its gradient along the axes in `freedom` (bit k: axis k).
     fn logit(&self, p: &Point<D>, freedom: u8) -> (f64, Point<D>) {
         let mut gradient = [0.0; D];
         let share = self.share.value_and_gradient(p, &mut gradient).clamp(1e-7, 1.0 - 1e-7);
@@ -127,22 +127,21 @@ impl<const D: usize> Outline<D> {
         ((share / (1.0 - share)).ln(), gradient)
     }
 
-    /// The unit normal of the outline near `p`, outward, along the axes that `freedom` names; `None` where
-    /// the mask is flat.
+    /// The outward unit normal of the outline near `p`, along the axes in `freedom`; `None` where the mask is constant.
     pub fn normal(&self, p: &Point<D>, freedom: u8) -> Option<Point<D>> {
         let (_, gradient) = self.logit(p, freedom);
         let length = dot(&gradient, &gradient).sqrt();
         (length > 0.0 && length.is_finite()).then(|| gradient.map(|g| -g / length))
     }
 
-    /// The point of the outline that is reached from `p` along the mask's gradient, by moves along the axes
-    /// that `freedom` names; `None` if there is none within `reach` and within the box.
+    /// The point of the outline that Newton's method reaches from `p` along the mask's gradient, by moves along the axes
+    /// in `freedom`; `None` if there is none within `reach` and within the box.
     pub fn project(&self, p: &Point<D>, freedom: u8, reach: f64) -> Option<Point<D>> {
         let mut q = *p;
         for _ in 0..STEP_LIMIT {
             let (value, gradient) = self.logit(&q, freedom);
             let squared = dot(&gradient, &gradient);
-            // the logit of an edge rises by 1.7/σ; one so flat that a step leaves reach ends the search
+            // the logit of an edge rises by 1.7/σ; where it is so flat that a step leaves reach, the search ends
             if squared.is_nan() || value.abs() > 4.0 * reach * squared.sqrt() {
                 return None;
             }
@@ -158,8 +157,8 @@ impl<const D: usize> Outline<D> {
         None
     }
 
-    /// Where the segment from `inside` to `outside` crosses the outline, by bisection: exactly on the
-    /// segment but for rounding, and exactly on a side of the box that both ends lie on.
+    /// Where the segment from `inside` to `outside` crosses the outline, by bisection: on the segment to rounding, and
+    /// exactly on a side of the box that both ends lie on.
     pub fn crossing(&self, inside: &Point<D>, outside: &Point<D>) -> Point<D> {
         let at = |t: f64| -> Point<D> {
             std::array::from_fn(|k| inside[k] + t * (outside[k] - inside[k]))
@@ -178,8 +177,8 @@ impl<const D: usize> Outline<D> {
         self.share.samples().iter().map(|&m| -4.0 * m * (1.0 - m))
     }
 
-    /// The potential that atoms of a masked mesh feel: that of the image inside of the mask, and that of the
-    /// outline.
+    /// Makes of the samples of b the potential for a masked mesh: the lesser of b, inside of the mask, and the outline's
+    /// [`Self::valley`].
     pub fn combine(&self, samples: &mut [f32]) {
         for (i, (b, valley)) in samples.iter_mut().zip(self.valley()).enumerate() {
             let own = if self.sample_is_inside(i) { *b } else { 0.0 };
@@ -188,16 +187,16 @@ impl<const D: usize> Outline<D> {
     }
 }
 
-/// The farthest that the level of the outline is shifted from one half to keep the mask's measure.
+/// Greatest shift of the outline's level from one half to keep the mask's measure.
 const MOST_SHIFT: f64 = 0.15;
 
-/// How far from its level a sample counts in part, in samples: half a cell of samples and some more, so that
+/// Within this distance of the level, in samples, a sample counts in part: somewhat more than half a sample, so that
 /// what a level holds does not jump from sample to sample.
 const SOFT: f64 = 0.75;
 
-/// Shifts smoothed shares so that the level of one half holds as much as the mask does: smoothing draws an
-/// outline that is bent toward its centre. The logits of all shares are shifted alike. `sigma` is the least
-/// standard deviation of the smoothing, in samples.
+/// Shifts smoothed shares so that the level of one half holds as much as the mask, `whole`: smoothing moves a bent
+/// outline toward its centre of curvature. All logits are shifted alike. `sigma` is the least standard deviation of the
+/// smoothing, in samples.
 fn shift(shares: &mut [f32], whole: f64, sigma: f64) {
     // an edge smoothed by σ has the slope 1/σ√2π where it is one half
     let slope = sigma * (2.0 * std::f64::consts::PI).sqrt() / (2.0 * SOFT);
@@ -222,7 +221,7 @@ fn shift(shares: &mut [f32], whole: f64, sigma: f64) {
     }
 }
 
-/// The share of each sample that is inside.
+/// The share of each sample that is inside: the values, if all are within 0…1; else 1 where they are not 0.
 fn shares(samples: &Samples) -> Result<Vec<f32>, RegionError> {
     let mut values = samples.to_f32();
     if let Some(index) = values.iter().position(|v| !v.is_finite()) {

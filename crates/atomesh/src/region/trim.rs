@@ -2,17 +2,17 @@
 //!
 //! Assumes a mesh whose points near the outline are on it. Edges that still cross it are split there: each
 //! cell splits its longest crossing edge first, then those of its parts, so that neighbours split their
-//! common facets alike. Then no cell has corners on both sides; cells with a corner inside stay, those with
-//! one outside go, and those with all corners on the outline are asked at their centroid. What makes the
-//! boundary no manifold is mended ([`super::carve`]). Cost: O(cells).
+//! common facets alike. Then no cell has corners on both sides: cells with a corner inside stay, those with one
+//! outside go, and those with all corners on the outline stay if their centroid is inside. Last, cells are dropped
+//! until the boundary is a manifold ([`super::manifold`]). Cost: O(cells).
 
 use rayon::prelude::*;
 
 use crate::geometry::{Bounds, Point, distance_squared};
-use crate::mesh::Mesh;
+use crate::mesh::{Mesh, sides_of};
 use crate::watch::{Phase, Watch, check};
 
-use super::carve::Carving;
+use super::manifold::until_manifold;
 use super::{Outline, RegionError};
 
 /// A point counts as on the outline if an edge from it crosses the outline within this share of its length.
@@ -39,14 +39,15 @@ impl<const D: usize> Trimmed<D> {
     }
 }
 
-/// Drops all cells outside of `outline`; `on_outline` says which points are on it, `freedom` how the box lets
-/// them move.
+/// The part of a mesh inside of `outline`. `on_outline` says which points are on it; `freedom` along which axes the
+/// box lets each point move, as bits.
 ///
 /// # Errors
 /// [`RegionError::SmallMask`] if no cell is inside, [`RegionError::Cancelled`].
-pub fn trim<const D: usize>(
+pub fn trim_to_outline<const D: usize>(
     mesh: Mesh<D>,
-    (on_outline, freedom): (&[bool], &[u8]),
+    on_outline: &[bool],
+    freedom: &[u8],
     outline: &Outline<D>,
     watch: &mut dyn Watch,
 ) -> Result<Trimmed<D>, RegionError> {
@@ -79,9 +80,7 @@ pub fn trim<const D: usize>(
     if !kept.contains(&true) {
         return Err(RegionError::SmallMask { distance: outline.least_distance() });
     }
-    let mut carving = Carving::new(&mesh, peelable, kept);
-    carving.mend();
-    let kept = carving.kept();
+    let kept = until_manifold(&mesh, peelable, kept);
     compact(&mesh, &freedom, &kept, outline.bounds())
         .ok_or(RegionError::SmallMask { distance: outline.least_distance() })
 }
@@ -98,8 +97,8 @@ fn centroid<const D: usize>(mesh: &Mesh<D>, cell: &[u32]) -> Point<D> {
 
 /// Whether points lie on one side of the box.
 fn is_on_side<const D: usize>(mesh: &Mesh<D>, points: &[u32], bounds: &Bounds<D>) -> bool {
-    let all_at = |k: usize, side: f64| points.iter().all(|&c| mesh.points()[c as usize][k] == side);
-    (0..D).any(|k| all_at(k, bounds.min[k]) || all_at(k, bounds.max[k]))
+    let sides = points.iter().map(|&c| sides_of(&mesh.points()[c as usize], bounds, 0.0));
+    sides.fold(!0, |shared, sides| shared & sides) != 0
 }
 
 fn has_facet_on_side<const D: usize>(mesh: &Mesh<D>, cell: &[u32], bounds: &Bounds<D>) -> bool {
@@ -109,7 +108,7 @@ fn has_facet_on_side<const D: usize>(mesh: &Mesh<D>, cell: &[u32], bounds: &Boun
     })
 }
 
-/// Where a point is.
+/// Where a point is, seen from the outline.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 enum Place {
     Inside,
@@ -117,6 +116,7 @@ enum Place {
     Outside,
 }
 
+/// A mesh whose edges are cut at the outline.
 struct Cutting<const D: usize> {
     points: Vec<Point<D>>,
     place: Vec<Place>,
@@ -209,7 +209,8 @@ impl<const D: usize> Cutting<D> {
     }
 }
 
-/// The axes along which a point between two others may move: those that the box does not hold both at.
+/// The axes, as bits, along which a point between two others may move: all but those along which the box holds both
+/// at one place.
 pub(crate) fn free_axes<const D: usize>(ends: [&Point<D>; 2], freedom: [u8; 2]) -> u8 {
     (0..D)
         .filter(|k| (freedom[0] | freedom[1]) >> k & 1 == 1 || ends[0][*k] != ends[1][*k])
@@ -217,7 +218,7 @@ pub(crate) fn free_axes<const D: usize>(ends: [&Point<D>; 2], freedom: [u8; 2]) 
         .sum()
 }
 
-/// Appends the parts of a cell that its cut edges leave, the cut of least rank made first.
+/// Appends the parts into which its cut edges divide a cell, the cut of least rank made first.
 fn split(cell: &[u32], cuts: &[Cut], parts: &mut Vec<u32>) {
     let mut first: Option<(&Cut, usize, usize)> = None;
     for i in 0..cell.len() {
@@ -243,7 +244,8 @@ fn split(cell: &[u32], cuts: &[Cut], parts: &mut Vec<u32>) {
     }
 }
 
-/// The kept cells with the points that they need, and the facets that are on no side of the box.
+/// The kept cells with the points that they need, and the facets that are on no side of the box; `None` if no cell
+/// is kept.
 fn compact<const D: usize>(
     mesh: &Mesh<D>,
     freedom: &[u8],
@@ -269,16 +271,17 @@ fn compact<const D: usize>(
     Some(Trimmed { mesh, freedom: free, facets })
 }
 
-/// The hull's facets that are on no side of the box, in the order of their cells, normals outward (see
-/// [`Mesh::facet_of`]): those on a mask's outline.
+/// The facets on a mask's outline: those of the hull that are on no side of the box (which [`Tags::sides`] groups), in
+/// the order of their cells, normals outward (see [`Mesh::facet_of`]).
+///
+/// [`Tags::sides`]: crate::mesh::Tags::sides
 pub fn outline_facets<const D: usize>(mesh: &Mesh<D>, bounds: &Bounds<D>) -> Vec<[u32; D]> {
     let mut found: Vec<(u32, [u32; D])> = Vec::new();
     for facet in mesh.facets().iter().filter(|facet| facet.neighbour.is_none()) {
         let at = facet.cell as usize * (D + 1);
         let cell = &mesh.corners()[at..at + D + 1];
         let Some(apex) = cell.iter().position(|c| !facet.corners.contains(c)) else { continue };
-        let on_side = is_on_side(mesh, &facet.corners, bounds);
-        if !on_side {
+        if !is_on_side(mesh, &facet.corners, bounds) {
             found.push((facet.cell, mesh.facet_of(facet.cell as usize, apex)));
         }
     }

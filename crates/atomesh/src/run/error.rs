@@ -45,6 +45,14 @@ pub enum RunError {
         /// The field's shape.
         found: Vec<usize>,
     },
+    /// Atoms or a mesh of another box than the image's.
+    #[error("the box is {found}; the image's is {expected}, in lattice units")]
+    OtherBox {
+        /// The image's box.
+        expected: String,
+        /// The box found.
+        found: String,
+    },
     /// The work would not fit in memory.
     #[error(
         "about {} of memory needed, {} available; a nominal distance above {least}, --crop, or a \

@@ -4,11 +4,12 @@ use crate::improve::{Improver, PlaneImprover, Space};
 use crate::lattice::{Crystal, Scatterer};
 use crate::mesh::Delaunay;
 
+use super::compiled::{self, Stages};
 use super::error::RunError;
 use super::estimate::Filling;
 use super::options::LatticeKind;
 
-/// The crystals and the connector of one dimension.
+/// The crystals, the connector and the compiled stages of one dimension.
 #[derive(Clone)]
 pub struct Method<const D: usize> {
     /// The default first.
@@ -18,6 +19,7 @@ pub struct Method<const D: usize> {
     scattered: Filling,
     evening: Option<Evening>,
     improver: Option<&'static dyn Improver<D>>,
+    stages: &'static Stages<D>,
 }
 
 /// How a crystal grown where d varies is evened out.
@@ -32,7 +34,7 @@ pub(super) struct Evening {
 
 impl Method<2> {
     /// Triangles from a hexagonal or random lattice.
-    pub fn flat() -> Self {
+    pub fn plane() -> Self {
         Self {
             crystals: vec![(LatticeKind::Hexagonal, Crystal::hexagonal())],
             delaunay: Delaunay::<2>::new(),
@@ -42,13 +44,14 @@ impl Method<2> {
             // three sweeps to 0.978
             evening: Some(Evening { rounds: 2, meshes: 3, sweeps: 4 }),
             improver: Some(&PlaneImprover),
+            stages: &compiled::PLANE,
         }
     }
 }
 
 impl Method<3> {
     /// Tetrahedra from a body-centred, face-centred or random lattice.
-    pub fn volume() -> Self {
+    pub fn space() -> Self {
         Self {
             crystals: vec![
                 (LatticeKind::Bcc, Crystal::body_centered_cubic()),
@@ -59,6 +62,7 @@ impl Method<3> {
             scattered: Filling { density: 1.36, rim: 0.85 },
             evening: None,
             improver: Some(&Space),
+            stages: &compiled::SPACE,
         }
     }
 }
@@ -84,6 +88,11 @@ impl<const D: usize> Method<D> {
         let crystal = self.crystals.iter().find(|(name, _)| *name == kind);
         let density = crystal.unwrap_or(&self.crystals[0]).1.density();
         Filling { density, rim: 0.3 }
+    }
+
+    /// The work of each stage.
+    pub(super) fn stages(&self) -> &'static Stages<D> {
+        self.stages
     }
 
     /// What connects the atoms.

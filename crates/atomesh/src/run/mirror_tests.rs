@@ -1,9 +1,11 @@
 //! Whether faces of Voronoi cells fall on features that repel.
 
 use super::*;
-use crate::geometry::{Bounds, difference, distance_squared, dot};
-use crate::image::Samples;
-use crate::measure::{AlignmentOptions, Features as Points, alignment_of_faces};
+use crate::crests::FeaturePoint;
+use crate::geometry::{Bounds, Point, difference, distance_squared, dot};
+use crate::image::{Frame, Image, Samples};
+use crate::measure::{AlignmentOptions, alignment_of_faces};
+use crate::mesh::PolyMesh;
 use crate::watch::Silent;
 
 /// b of features that repel: a Gaussian of `width` samples across the distance to each, the highest of them.
@@ -40,7 +42,7 @@ fn options<const D: usize>(d: f64) -> MeshOptions<D> {
 fn assert_sound<const D: usize>(outcome: &Outcome<D>, cells: &PolyMesh<D>) {
     cells.validate(&outcome.potential().grid().bounds()).unwrap();
     for (&a, &b) in cells.owners().iter().zip(cells.neighbours()) {
-        let [p, q] = [a, b].map(|cell| cells.sites()[cell as usize]);
+        let [p, q] = [a, b].map(|cell| cells.centers()[cell as usize]);
         let d = outcome.distance().at(&p).min(outcome.distance().at(&q));
         let gap = distance_squared(&p, &q).sqrt() / d;
         assert!(gap >= 0.4, "{p:?} and {q:?} are {gap} d apart");
@@ -49,8 +51,8 @@ fn assert_sound<const D: usize>(outcome: &Outcome<D>, cells: &PolyMesh<D>) {
 
 /// The share of points that a face passes within max(1, d/10) and 20° of the normal.
 fn recall<const D: usize>(cells: &PolyMesh<D>, on: &[(Point<D>, Point<D>)], d: f64) -> f64 {
-    let (positions, normals) = on.iter().copied().unzip();
-    let points = Points { positions, normals };
+    let point = |&(position, normal)| FeaturePoint { index: 0, position, normal, strength: 1.0 };
+    let points: Vec<FeaturePoint<D>> = on.iter().map(point).collect();
     let report =
         alignment_of_faces(cells, &points, &AlignmentOptions::new(d), &mut Silent).unwrap();
     assert!(report.features > 50, "{}", report.features);
@@ -109,9 +111,9 @@ fn a_plane_is_followed<const D: usize>(
 
 #[test]
 fn tilted_lines_and_planes_are_followed_whole() {
-    a_plane_is_followed(&Method::flat(), [90, 80], [1.0, 0.31], 6.0);
-    a_plane_is_followed(&Method::flat(), [90, 80], [0.7, -1.0], 6.0);
-    a_plane_is_followed(&Method::volume(), [40, 36, 38], [1.0, 0.25, -0.4], 5.0);
+    a_plane_is_followed(&Method::plane(), [90, 80], [1.0, 0.31], 6.0);
+    a_plane_is_followed(&Method::plane(), [90, 80], [0.7, -1.0], 6.0);
+    a_plane_is_followed(&Method::space(), [40, 36, 38], [1.0, 0.25, -0.4], 5.0);
 }
 
 fn a_sphere_is_followed<const D: usize>(method: &Method<D>, shape: [usize; D], d: f64, least: f64) {
@@ -137,10 +139,10 @@ fn a_sphere_is_followed<const D: usize>(method: &Method<D>, shape: [usize; D], d
 #[test]
 fn circles_and_spheres_are_followed() {
     // chords 0.85 d long turn from the arc by 8° at their ends and leave it by 0.03 d
-    a_sphere_is_followed(&Method::flat(), [60, 60], 6.0, 0.97);
+    a_sphere_is_followed(&Method::plane(), [60, 60], 6.0, 0.97);
     // corners of faces are up to 0.8 d from the foot, where a sphere has turned by 15°, and feet do not spread
     // over it evenly; it was 0.90
-    a_sphere_is_followed(&Method::volume(), [44, 44, 44], 5.0, 0.85);
+    a_sphere_is_followed(&Method::space(), [44, 44, 44], 5.0, 0.85);
 }
 
 fn crossing_planes_are_followed<const D: usize>(
@@ -173,8 +175,8 @@ fn crossing_planes_are_followed<const D: usize>(
 
 #[test]
 fn features_that_cross_are_followed_but_for_the_crossing() {
-    crossing_planes_are_followed(&Method::flat(), [100, 100], 6.0, 0.9);
-    crossing_planes_are_followed(&Method::volume(), [44, 44, 30], 5.0, 0.85);
+    crossing_planes_are_followed(&Method::plane(), [100, 100], 6.0, 0.9);
+    crossing_planes_are_followed(&Method::space(), [44, 44, 30], 5.0, 0.85);
 }
 
 #[test]
@@ -182,10 +184,10 @@ fn a_feature_along_a_side_spoils_nothing() {
     // on the side itself, and so near that there is no room for a pair, or just enough
     for x in [0.0, 1.0, 2.0, 3.0, 4.5] {
         let b = repelling([70, 50], 1.5, |p| p[0] - x);
-        let (outcome, cells) = cells(&Method::flat(), &b, options(6.0));
+        let (outcome, cells) = cells(&Method::plane(), &b, options(6.0));
         assert_sound(&outcome, &cells);
         let b = repelling([24, 22, 20], 1.2, |p| p[0] - x);
-        let (outcome, cells) = self::cells(&Method::volume(), &b, options(5.0));
+        let (outcome, cells) = self::cells(&Method::space(), &b, options(5.0));
         assert_sound(&outcome, &cells);
     }
 }
@@ -198,10 +200,10 @@ fn without_features_nothing_changes() {
     let values = dark.samples().to_f32().iter().map(|b| -b).collect();
     let dark = Image::new(*dark.frame(), Samples::F32(values)).unwrap();
     for b in [b, dark] {
-        let (outcome, with) = cells(&Method::flat(), &b, options(6.0));
+        let (outcome, with) = cells(&Method::plane(), &b, options(6.0));
         let plain = MeshOptions { mirror: false, ..options(6.0) };
-        let (_, without) = cells(&Method::flat(), &b, plain);
-        assert_eq!(with.sites(), without.sites());
+        let (_, without) = cells(&Method::plane(), &b, plain);
+        assert_eq!(with.centers(), without.centers());
         assert_eq!(outcome.mirror_report(), None);
     }
 }
@@ -211,7 +213,7 @@ fn where_d_varies_features_are_followed_too() {
     let (through, normal) = ([70.3, 60.1], unit([1.0, 0.4]));
     let b = repelling([150, 120], 1.0, |p| dot(&difference(p, &through), &normal));
     let size = Size::Range { min: 4.0, max: 12.0 };
-    let (outcome, cells) = cells(&Method::flat(), &b, MeshOptions { size, ..options(4.0) });
+    let (outcome, cells) = cells(&Method::plane(), &b, MeshOptions { size, ..options(4.0) });
     assert_sound(&outcome, &cells);
     let greatest = outcome.distance().greatest();
     assert!(greatest > 2.0 * outcome.distance().least());
@@ -225,8 +227,8 @@ fn a_well_stays_beside_and_on_a_feature() {
     for well in [[40.0, 30.0], [41.8, 30.0], [43.0, 30.0], [46.0, 30.0]] {
         let seed_points = vec![well];
         let given = MeshOptions { seed_points, ..options(6.0) };
-        let (outcome, cells) = cells(&Method::flat(), &b, given);
-        assert!(cells.sites().contains(&well), "{well:?}");
+        let (outcome, cells) = cells(&Method::plane(), &b, given);
+        assert!(cells.centers().contains(&well), "{well:?}");
         assert_sound(&outcome, &cells);
     }
 }
@@ -237,9 +239,9 @@ fn sites_do_not_depend_on_the_number_of_threads() {
     let b = repelling([40, 36, 38], 1.2, |p| distance_squared(p, &centre).sqrt() - 13.0);
     let run = |threads| {
         let pool = rayon::ThreadPoolBuilder::new().num_threads(threads).build().unwrap();
-        pool.install(|| cells(&Method::volume(), &b, options(5.0)).1)
+        pool.install(|| cells(&Method::space(), &b, options(5.0)).1)
     };
     let (one, two) = (run(1), run(2));
-    assert_eq!(one.sites(), two.sites());
+    assert_eq!(one.centers(), two.centers());
     assert_eq!(one.points(), two.points());
 }

@@ -4,13 +4,14 @@ use rand::{RngExt, SeedableRng};
 use rand_pcg::Pcg64;
 
 use super::*;
-use crate::fields::{DistanceError, GradeBy};
-use crate::geometry::difference;
-use crate::image::Samples;
+use crate::enhance::{FeatureOptions, Features};
+use crate::fields::{DistanceError, GradeBy, Interpolation};
+use crate::geometry::{Point, difference};
+use crate::image::{Frame, Image, Samples, Units};
 use crate::lattice::LatticeError;
 use crate::mesh::Mesh;
-use crate::optimize::OptimizeOptions;
-use crate::watch::Silent;
+use crate::optimize::{EngineKind, OptimizeOptions};
+use crate::watch::{Phase, Silent, Watch};
 
 fn image<const D: usize>(frame: Frame<D>, grey: impl Fn([usize; D]) -> f32) -> Image<D> {
     let shape = frame.shape();
@@ -223,21 +224,21 @@ fn meshes_or_refusals<const D: usize>(
 
 #[test]
 fn any_flat_image_ends_in_a_mesh_or_a_clear_refusal() {
-    let meshes = meshes_or_refusals(&Method::flat(), MeshKind::Delaunay, 140, 40);
+    let meshes = meshes_or_refusals(&Method::plane(), MeshKind::Delaunay, 140, 40);
     assert!(meshes > 70, "{meshes}"); // some 45 of 100 ask for what there is not
 }
 
 #[test]
 fn any_volume_ends_in_a_mesh_or_a_clear_refusal() {
-    let meshes = meshes_or_refusals(&Method::volume(), MeshKind::Delaunay, 60, 12);
+    let meshes = meshes_or_refusals(&Method::space(), MeshKind::Delaunay, 60, 12);
     assert!(meshes > 30, "{meshes}");
 }
 
 #[test]
 fn any_image_ends_in_voronoi_cells_or_a_clear_refusal() {
-    let meshes = meshes_or_refusals(&Method::flat(), MeshKind::Voronoi, 60, 30);
+    let meshes = meshes_or_refusals(&Method::plane(), MeshKind::Voronoi, 60, 30);
     assert!(meshes > 25, "{meshes}");
-    let meshes = meshes_or_refusals(&Method::volume(), MeshKind::Voronoi, 30, 10);
+    let meshes = meshes_or_refusals(&Method::space(), MeshKind::Voronoi, 30, 10);
     assert!(meshes > 12, "{meshes}");
 }
 
@@ -246,14 +247,14 @@ fn a_constant_image_gives_a_warning_and_a_regular_mesh() {
     let flat = image(Frame::new([40, 30]).unwrap(), |_| 7.0);
     for features in [Features::Dark, Features::Bright, Features::Edges] {
         let features = FeatureOptions { features, ..Default::default() };
-        let outcome = run(&Method::flat(), &flat, MeshOptions { features, ..sized(4.0) }).unwrap();
+        let outcome = run(&Method::plane(), &flat, MeshOptions { features, ..sized(4.0) }).unwrap();
         assert_sound(&outcome, "constant");
         assert_eq!(outcome.warnings(), [Warning::Constant]);
         assert!(outcome.potential_at_points().iter().all(|b| *b == 0.0));
     }
     // who asks for nothing needs no warning
     let features = FeatureOptions { features: Features::None, ..Default::default() };
-    let outcome = run(&Method::flat(), &flat, MeshOptions { features, ..sized(4.0) }).unwrap();
+    let outcome = run(&Method::plane(), &flat, MeshOptions { features, ..sized(4.0) }).unwrap();
     assert_eq!(outcome.warnings(), []);
 }
 
@@ -265,7 +266,7 @@ fn edges_are_a_share_of_a_wavelength() {
     let features = FeatureOptions { features: Features::None, ..Default::default() };
     let size = Size::Wavelength { frequency: 2.0, points: 5.0 };
     let options = MeshOptions { features, size, ..Default::default() };
-    let outcome = run(&Method::flat(), &velocities, options.clone()).unwrap();
+    let outcome = run(&Method::plane(), &velocities, options.clone()).unwrap();
     assert_sound(&outcome, "wavelength");
     let distance = outcome.distance();
     for depth in [0.0, 500.0, 1700.0] {
@@ -277,19 +278,19 @@ fn edges_are_a_share_of_a_wavelength() {
     let mean = outcome.report(&mut Silent).unwrap().shape.edge_mean;
     assert!((160.0..205.0).contains(&mean), "{mean}: about 180, the middle of 150 to 210");
     let still = image(frame, |i| if i == [5, 1] { 0.0 } else { 1500.0 });
-    let error = run(&Method::flat(), &still, options).unwrap_err().to_string();
+    let error = run(&Method::plane(), &still, options).unwrap_err().to_string();
     assert!(error.contains("distance 0 at sample 106"), "{error}");
 }
 
 #[test]
 fn a_distance_beyond_the_box_gives_a_warning_and_the_coarsest_mesh() {
     let flat = sheet(Frame::new([30, 20]).unwrap());
-    let outcome = run(&Method::flat(), &flat, sized(100.0)).unwrap();
+    let outcome = run(&Method::plane(), &flat, sized(100.0)).unwrap();
     assert_sound(&outcome, "coarse");
     assert!(matches!(outcome.warnings(), [Warning::Coarse { distance: 100.0, .. }]));
     assert_eq!((outcome.mesh().points().len(), outcome.mesh().cell_count()), (4, 2));
     let solid = sheet(Frame::new([12, 9, 10]).unwrap());
-    let outcome = run(&Method::volume(), &solid, sized(100.0)).unwrap();
+    let outcome = run(&Method::space(), &solid, sized(100.0)).unwrap();
     assert_sound(&outcome, "coarse");
     assert_eq!(outcome.mesh().points().len(), 8);
     // a box is cut into five or six tetrahedra
@@ -300,7 +301,7 @@ fn a_distance_beyond_the_box_gives_a_warning_and_the_coarsest_mesh() {
 fn what_cannot_be_meshed_is_refused_by_name() {
     let flat = sheet(Frame::new([30, 20]).unwrap());
     let refused = |image: &Image<2>, options| {
-        run(&Method::flat(), image, options).expect_err("should be refused").to_string()
+        run(&Method::plane(), image, options).expect_err("should be refused").to_string()
     };
     assert!(refused(&flat, sized(0.5)).contains("0.5 is below the sample step 1"));
     assert!(refused(&flat, sized(f64::NAN)).contains("NaN"));
@@ -322,15 +323,15 @@ fn what_cannot_be_meshed_is_refused_by_name() {
         ("size field", Inputs { size_field: Some(&small), ..Inputs::image(&flat) }),
         ("weight field", Inputs { weight_field: Some(&small), ..Inputs::image(&flat) }),
     ] {
-        let error = prepare(&Method::flat(), inputs, sized(4.0), &mut Silent).err().unwrap();
+        let error = prepare(&Method::plane(), inputs, sized(4.0), &mut Silent).err().unwrap();
         assert!(error.to_string().contains(name), "{error}");
         assert!(error.to_string().contains("[30, 19]"), "{error}");
     }
     let inputs = Inputs { is_potential: true, ..Inputs::image(&flat) };
-    let error = prepare(&Method::flat(), inputs, sized(4.0), &mut Silent).err().unwrap();
+    let error = prepare(&Method::plane(), inputs, sized(4.0), &mut Silent).err().unwrap();
     assert!(error.to_string().contains("potential"), "{error}");
     let line = image(Frame::new([9, 8, 1]).unwrap(), |_| 0.0);
-    let error = run(&Method::volume(), &line, sized(4.0)).unwrap_err();
+    let error = run(&Method::space(), &line, sized(4.0)).unwrap_err();
     assert_eq!(error, RunError::Thin { axis: 2 });
 }
 
@@ -338,12 +339,12 @@ fn what_cannot_be_meshed_is_refused_by_name() {
 fn a_memory_limit_refuses_with_advice() {
     let flat = sheet(Frame::new([60, 60]).unwrap());
     let options = MeshOptions { memory_limit: Some(1 << 20), ..sized(4.0) };
-    let error = run(&Method::flat(), &flat, options).unwrap_err();
+    let error = run(&Method::plane(), &flat, options).unwrap_err();
     assert!(matches!(error, RunError::Memory { available: 1_048_576, .. }));
     let text = error.to_string();
     assert!(text.contains("1 MiB available") && text.contains("distance above 4"), "{text}");
     let options = MeshOptions { memory_limit: Some(1 << 30), ..sized(4.0) };
-    assert!(run(&Method::flat(), &flat, options).is_ok());
+    assert!(run(&Method::plane(), &flat, options).is_ok());
 }
 
 /// The root mean square of the edge components along each axis.
@@ -372,7 +373,7 @@ fn edges_are_as_long_along_every_axis_whatever_the_spacings_are() {
         if r.sqrt() < 12.0 { 200.0 } else { 60.0 }
     });
     let features = FeatureOptions { features: Features::Edges, ..Default::default() };
-    let outcome = run(&Method::volume(), &ball, MeshOptions { features, ..sized(4.0) }).unwrap();
+    let outcome = run(&Method::space(), &ball, MeshOptions { features, ..sized(4.0) }).unwrap();
     assert_sound(&outcome, "unequal spacings");
     let rms = edge_components(outcome.mesh());
     let mean = rms.iter().sum::<f64>() / 3.0;
@@ -385,21 +386,21 @@ fn in_sample_units_the_spacing_places_the_mesh_and_changes_nothing_else() {
     let unit = Frame::new([50, 40]).unwrap();
     let spaced = unit.with_spacing([0.5, 2.0]).unwrap();
     let options = || MeshOptions { units: Units::Samples, ..sized(5.0) };
-    let a = run(&Method::flat(), &sheet(unit), options()).unwrap();
-    let b = run(&Method::flat(), &sheet(spaced), options()).unwrap();
+    let a = run(&Method::plane(), &sheet(unit), options()).unwrap();
+    let b = run(&Method::plane(), &sheet(spaced), options()).unwrap();
     assert_eq!(a.mesh(), b.mesh());
     assert_eq!(a.mesh(), &b.sample_mesh());
     let world: Vec<Point<2>> = a.mesh().points().iter().map(|p| [0.5 * p[0], 2.0 * p[1]]).collect();
     assert_eq!(b.world_mesh().points(), world);
     // and a unit frame is the same in both units
-    let c = run(&Method::flat(), &sheet(unit), sized(5.0)).unwrap();
+    let c = run(&Method::plane(), &sheet(unit), sized(5.0)).unwrap();
     assert_eq!(a.mesh(), c.mesh());
 }
 
 #[test]
 fn rotated_and_mirrored_frames_place_the_mesh_and_change_nothing_else() {
     let plain = Frame::new([16, 14, 12]).unwrap().with_spacing([1.0, 1.5, 2.0]).unwrap();
-    let method = Method::volume();
+    let method = Method::space();
     let reference = run(&method, &sheet(plain), sized(4.0)).unwrap();
     let (s, c) = 0.3f64.sin_cos();
     let directions = [
@@ -435,7 +436,7 @@ fn seed_points_of_the_world_are_points_of_the_mesh() {
             // inside, and on a side, which rounding puts a little outside
             let seeds = [[6.25, 17.5], [0.0, 11.25]].map(|p| frame.lattice_to_world(units, &p));
             let options = MeshOptions { units, lattice, seed_points: seeds.to_vec(), ..sized(3.0) };
-            let outcome = run(&Method::flat(), &sheet(frame), options).unwrap();
+            let outcome = run(&Method::plane(), &sheet(frame), options).unwrap();
             assert_sound(&outcome, "seeds");
             for seed in seeds {
                 let mesh = outcome.world_mesh();
@@ -456,10 +457,10 @@ fn a_run_gives_the_same_bits_at_any_number_of_threads() {
             let graded = MeshOptions { size: Size::Range { min: 2.0, max: 6.0 }, ..sized(2.0) };
             let random = MeshOptions { lattice: LatticeKind::Random, ..graded.clone() };
             let bits = |o: &Outcome<3>| (o.mesh().clone(), o.optimize_report().clone());
-            let method = Method::volume();
+            let method = Method::space();
             let a = run(&method, &solid, graded).unwrap();
             let b = run(&method, &solid, random).unwrap();
-            let c = run(&Method::flat(), &flat, sized(3.0)).unwrap();
+            let c = run(&Method::plane(), &flat, sized(3.0)).unwrap();
             (bits(&a), bits(&b), c.mesh().clone())
         })
     };
@@ -481,7 +482,7 @@ fn estimates_are_near<const D: usize>(method: &Method<D>, shapes: &[[usize; D]],
                 let prepared =
                     prepare(method, Inputs::image(&image), options, &mut Silent).unwrap();
                 let estimate = prepared.estimate().atoms as f64;
-                let actual = prepared.grow(&mut Silent).unwrap().len() as f64;
+                let actual = prepared.fill(&mut Silent).unwrap().lattice().len() as f64;
                 if (estimate / actual - 1.0).abs() > 0.15 {
                     faults.push(format!(
                         "{shape:?} {size:?} {lattice:?}: {estimate} estimated, {actual} found, {:.2}",
@@ -497,16 +498,16 @@ fn estimates_are_near<const D: usize>(method: &Method<D>, shapes: &[[usize; D]],
 #[test]
 fn the_number_of_atoms_is_known_to_15_percent() {
     let sizes = [Size::Constant(3.0), Size::Constant(6.0), Size::Range { min: 3.0, max: 9.0 }];
-    estimates_are_near(&Method::flat(), &[[100, 100], [200, 40], [60, 90]], &sizes);
+    estimates_are_near(&Method::plane(), &[[100, 100], [200, 40], [60, 90]], &sizes);
     let sizes = [Size::Constant(3.0), Size::Constant(5.0), Size::Range { min: 2.5, max: 6.0 }];
-    estimates_are_near(&Method::volume(), &[[30, 30, 30], [50, 30, 18]], &sizes);
+    estimates_are_near(&Method::space(), &[[30, 30, 30], [50, 30, 18]], &sizes);
 }
 
 #[test]
 fn lengths_of_any_magnitude_are_meshed_and_absurd_ones_refused() {
     for scale in [1e-300, 1e-160, 1e-31, 1e-29, 1e-9, 1e9, 1e28, 1e31, 1e160, 1e300] {
         let frame = Frame::new([30, 20]).unwrap().with_spacing([scale; 2]).unwrap();
-        match run(&Method::flat(), &sheet(frame), sized(4.0 * scale)) {
+        match run(&Method::plane(), &sheet(frame), sized(4.0 * scale)) {
             Ok(outcome) => {
                 assert_sound(&outcome, &format!("{scale:e}"));
                 assert_eq!(outcome.world_mesh().validate(), Ok(()));
@@ -522,7 +523,7 @@ fn lengths_of_any_magnitude_are_meshed_and_absurd_ones_refused() {
 
 #[test]
 fn a_report_of_the_mesh_is_in_range() {
-    let outcome = run(&Method::flat(), &sheet(Frame::new([80, 70]).unwrap()), sized(6.0)).unwrap();
+    let outcome = run(&Method::plane(), &sheet(Frame::new([80, 70]).unwrap()), sized(6.0)).unwrap();
     let report = outcome.report(&mut Silent).unwrap();
     let recall = report.alignment.recall.expect("a sheet is a feature");
     assert!(recall > 0.5 && recall <= 1.0, "a straight sheet is easy: {report:?}");
@@ -545,7 +546,7 @@ impl Watch for EndAt {
 #[test]
 fn a_watch_ends_a_run_in_every_phase() {
     let flat = sheet(Frame::new([60, 50]).unwrap());
-    let method = Method::flat();
+    let method = Method::plane();
     let end_at = |calls| {
         let mut watch = EndAt(calls);
         prepare(&method, Inputs::image(&flat), sized(4.0), &mut watch)

@@ -1,16 +1,16 @@
 //! Properties of cells from an image: means, deviations, extremes, majorities and totals of the samples inside.
 //!
-//! A sample stands for the box around it, one sample wide and cut where it would leave the image's box: at the
-//! rim, where meshes end on samples, half of it is inside, at an edge a quarter, at a corner an eighth. So the
-//! boxes fill the image's box as cells do, and totals are conserved: summed over cells that fill the box they
-//! are the sum over samples of value times box. Each sample counts by the exact volume (in 2-D area) that its
-//! box shares with the cell (`overlap`), not by where its centre lies.
+//! A sample stands for the box around it, one sample wide and cut at the image's box: on a side of the image's box half
+//! of it is inside, on an edge a quarter, at a corner an eighth. So the boxes of all samples fill the image's box, and
+//! totals are conserved: summed over cells that fill the box, they are the sum over samples of value times box. A sample
+//! counts by the exact volume (in 2-D area) that its box shares with the cell (`overlap`), not by its centre.
 //!
-//! Cells and image may be placed by different frames; each cell is brought into the image's sample coordinates.
-//! What lies beyond the image, or on samples that are not finite, has no samples: a cell's *coverage* says which
-//! part of it has. In this order, for each cell by itself, cells side by side: overlaps, sums, statistics. The
-//! same result at any thread count. Cost: O(samples in the bounds of the cells).
+//! Cells and image may have different frames; each cell is moved to the image's sample coordinates. Where there is no
+//! image, or a sample is not finite, a cell has no samples; its *coverage* is the part that has. Cells are handled in
+//! parallel, each by itself: overlaps, sums, statistics. The same result at any thread count. Cost: O(samples in the
+//! bounds of the cells).
 
+mod cells;
 mod clip;
 mod overlap;
 mod statistic;
@@ -20,8 +20,8 @@ mod tests;
 
 use crate::geometry::Point;
 use crate::image::{Frame, Image, Samples, Units};
-use crate::mesh::Mesh;
 use crate::watch::{Cancelled, Phase, Watch, check};
+pub use cells::CellSurfaces;
 use clip::Axis;
 use overlap::{Overlaps, Surface};
 use rayon::prelude::*;
@@ -34,8 +34,8 @@ const CELLS_PER_STEP: usize = 1 << 15;
 /// Cells that a thread takes at once.
 const CELLS_PER_TASK: usize = 64;
 
-/// Overlaps below this share of a sample's box or of the cell, whichever is smaller, count in totals alone: they
-/// may be roundings, which with coordinates up to 10⁴ samples are some 10⁻¹².
+/// Overlaps below this share of a sample's box or of the cell, whichever is smaller, count only in totals: they may be
+/// roundings, which with coordinates up to 10⁴ samples are some 10⁻¹².
 const ROUNDING: f64 = 1e-9;
 
 /// Why cells cannot be sampled.
@@ -56,7 +56,7 @@ pub enum SampleError {
         /// The number of samples given.
         found: usize,
     },
-    /// A mean that is defined for positive numbers alone.
+    /// A negative sample, for a mean that needs samples of 0 or more.
     #[error("sample {index} is {value}; the {statistic} mean needs samples of 0 or more")]
     Negative {
         /// The mean asked for.
@@ -66,7 +66,7 @@ pub enum SampleError {
         /// The sample found.
         value: f64,
     },
-    /// Labels that are no whole numbers.
+    /// A label that is not a whole number.
     #[error("sample {index} is {value}; the {statistic} of labels needs whole numbers")]
     Label {
         /// The statistic asked for.
@@ -79,37 +79,6 @@ pub enum SampleError {
     /// The work was ended by its watch.
     #[error(transparent)]
     Cancelled(#[from] Cancelled),
-}
-
-/// Cells as closed surfaces: whatever has flat facets can be sampled, simplices and convex polyhedra alike.
-pub trait Cells<const D: usize>: Sync {
-    /// How many cells there are.
-    fn cell_count(&self) -> usize;
-
-    /// Calls `visit` with the corners of each facet of a cell, a convex polygon (3-D) or an edge (2-D). In 3-D
-    /// they follow each other counter-clockwise as seen from outside, in 2-D the cell lies to the left; all
-    /// facets of a cell may go the other way round.
-    fn visit_facets(&self, cell: usize, visit: &mut dyn FnMut(&[Point<D>]));
-}
-
-impl<const D: usize> Cells<D> for Mesh<D> {
-    fn cell_count(&self) -> usize {
-        Self::cell_count(self)
-    }
-
-    fn visit_facets(&self, cell: usize, visit: &mut dyn FnMut(&[Point<D>])) {
-        let corners = &self.corners()[cell * (D + 1)..(cell + 1) * (D + 1)];
-        for opposite in 0..=D {
-            // leaving out corner k from an even permutation turns the rest by (−1)^k
-            let mut facet: [Point<D>; D] = std::array::from_fn(|k| {
-                self.points()[corners[k + usize::from(k >= opposite)] as usize]
-            });
-            if opposite % 2 == 1 {
-                facet.swap(D - 2, D - 1);
-            }
-            visit(&facet);
-        }
-    }
 }
 
 /// How cells are sampled.
@@ -128,7 +97,7 @@ impl<'a> SampleOptions<'a> {
     }
 }
 
-/// What the samples in each cell amount to.
+/// The statistics of the samples in each cell.
 #[derive(Clone, Debug, PartialEq)]
 pub struct CellProperties {
     /// A value for each cell, for each statistic in the order asked for.
@@ -140,7 +109,7 @@ pub struct CellProperties {
 }
 
 impl CellProperties {
-    /// How many cells have samples in a part of them only, or none.
+    /// The number of cells with a coverage below 1.
     pub fn partial_count(&self) -> usize {
         self.coverage.iter().filter(|&&part| part < 1.0).count()
     }
@@ -151,23 +120,23 @@ impl CellProperties {
 /// # Errors
 /// As [`sample_placed`].
 pub fn sample<const D: usize>(
-    cells: &impl Cells<D>,
+    cells: &impl CellSurfaces<D>,
     image: &Image<D>,
     options: SampleOptions<'_>,
     watch: &mut dyn Watch,
 ) -> Result<CellProperties, SampleError> {
-    sample_placed(cells, (image.frame(), image.samples()), options, watch)
+    sample_placed(cells, image.frame(), image.samples(), options, watch)
 }
 
-/// [`sample`] for samples that a frame places where the cells are: not in the world but, for a mesh in lattice
-/// coordinates, by the steps of its grid.
+/// [`sample`] for samples and cells in any coordinates that `frame` maps samples to, such as lattice coordinates.
 ///
 /// # Errors
 /// [`SampleError`] if the image has one sample along an axis or another number of samples than the frame, a
 /// mean or majority is not defined for the samples, or the watch ends the work.
 pub fn sample_placed<const D: usize>(
-    cells: &impl Cells<D>,
-    (frame, samples): (&Frame<D>, &Samples),
+    cells: &impl CellSurfaces<D>,
+    frame: &Frame<D>,
+    samples: &Samples,
     options: SampleOptions<'_>,
     watch: &mut dyn Watch,
 ) -> Result<CellProperties, SampleError> {
@@ -187,8 +156,8 @@ pub fn sample_placed<const D: usize>(
             .into_par_iter()
             .with_min_len(CELLS_PER_TASK)
             .map_init(
-                || Room::new(frame, options.statistics),
-                |room, cell| sampler.cell(cell, room),
+                || Buffers::new(frame, options.statistics),
+                |buffers, cell| sampler.cell(cell, buffers),
             )
             .collect();
         for Found { measure, coverage, values } in found {
@@ -200,7 +169,7 @@ pub fn sample_placed<const D: usize>(
     Ok(properties)
 }
 
-/// Refuses samples that a statistic is not defined for.
+/// Checks that every statistic is defined for the samples.
 fn check_samples<const D: usize>(
     frame: &Frame<D>,
     samples: &Samples,
@@ -231,21 +200,21 @@ fn check_samples<const D: usize>(
     Ok(())
 }
 
-/// What is known of a cell.
+/// The properties of one cell.
 struct Found {
     measure: f64,
     coverage: f64,
     values: Vec<f64>,
 }
 
-/// What a thread works with.
-struct Room {
+/// Buffers that a thread uses again for each of its cells.
+struct Buffers {
     surface: Surface,
     overlaps: Overlaps,
     tally: Tally,
 }
 
-impl Room {
+impl Buffers {
     fn new<const D: usize>(frame: &Frame<D>, statistics: &[Statistic]) -> Self {
         let axis = |k: usize| match frame.shape().get(k) {
             Some(&count) => Axis::of_samples(count),
@@ -268,9 +237,9 @@ struct Sampler<'a, const D: usize, C> {
     unit: f64,
 }
 
-impl<const D: usize, C: Cells<D>> Sampler<'_, D, C> {
-    fn cell(&self, cell: usize, room: &mut Room) -> Found {
-        let Room { surface, overlaps, tally } = room;
+impl<const D: usize, C: CellSurfaces<D>> Sampler<'_, D, C> {
+    fn cell(&self, cell: usize, buffers: &mut Buffers) -> Found {
+        let Buffers { surface, overlaps, tally } = buffers;
         surface.clear();
         self.cells.visit_facets(cell, &mut |facet| push(surface, facet, self.frame));
         let signed = surface.measure();
@@ -297,7 +266,7 @@ impl<const D: usize, C: Cells<D>> Sampler<'_, D, C> {
     }
 }
 
-/// Adds a facet in sample coordinates; over an edge in the plane stands a wall of height one.
+/// Adds a facet in sample coordinates; an edge in the plane (2-D) becomes a wall of height one.
 fn push<const D: usize>(surface: &mut Surface, facet: &[Point<D>], frame: &Frame<D>) {
     let place = |p: &Point<D>, z: f64| -> Point<3> {
         let p = frame.world_to_lattice(Units::Samples, p);

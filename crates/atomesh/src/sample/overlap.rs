@@ -1,20 +1,19 @@
 //! How much of each sample's box lies in a cell, exactly.
 //!
-//! No solid is ever cut, only the cell's facets. A cell's part in a row of boxes along axis 0 lies between
-//! the facets that the row passes through: a piece of facet that looks up the axis fills the row before it, one
-//! that looks down takes the same away again. So each facet is cut into slabs across axis 2, those into strips
-//! across axis 1, those into pieces across axis 0; a piece adds its share of its own box and its *shadow*, its
-//! area seen along the row, to all boxes before. One sum along the row then gives every overlap, and boxes
-//! wholly inside cost an addition. Overlaps of a cell sum to its measure, and those of the cells around a
-//! sample to its box, since neighbours share the pieces between them with opposite sign.
+//! No solid is ever cut, only the cell's facets. A cell's part in a row of boxes along axis 0 lies between the facets
+//! that the row passes through: a piece of facet whose normal points up the axis fills the row before it, and one whose
+//! normal points down empties it again. So each facet is cut into slabs across axis 2, those into strips across axis 1,
+//! those into pieces across axis 0. A piece adds its share to its own box, and its *shadow*, its area seen along the row,
+//! to all boxes before. One sum along the row then gives every overlap, and boxes wholly inside cost one addition. The
+//! overlaps of a cell sum to its measure, and those of all cells with a sample's box to the box, since neighbours share
+//! the pieces between them with opposite sign.
 //!
-//! A triangle is handled as the prism of height one over it. Cost: O(boxes in the cell's bounds).
+//! A triangle of the plane is handled as the prism of height one over it. Cost: O(boxes in the cell's bounds).
 
 use super::clip::{Axis, Parts, each_part, shadow, split};
 use crate::geometry::Point;
 
-/// The corners of a cell's facets, each in order, outward seen counter-clockwise; all or none the other way
-/// round.
+/// A cell's facets by their corners, counter-clockwise as seen from outside, or all of them clockwise.
 #[derive(Default)]
 pub(super) struct Surface {
     corners: Vec<Point<3>>,
@@ -22,7 +21,7 @@ pub(super) struct Surface {
 }
 
 impl Surface {
-    /// Takes all facets away.
+    /// Removes all facets.
     pub fn clear(&mut self) {
         self.corners.clear();
         self.ends.clear();
@@ -48,7 +47,7 @@ impl Surface {
 /// Finds overlaps of cells with the boxes of an image's samples.
 pub(super) struct Overlaps {
     axes: [Axis; 3],
-    /// What is left of each facet beyond the slab at hand.
+    /// The part of each facet beyond the current slab.
     rests: Vec<Vec<Point<3>>>,
     slab: Vec<Point<3>>,
     spare: Vec<Point<3>>,
@@ -71,9 +70,9 @@ impl Overlaps {
         }
     }
 
-    /// Calls `visit` with the first sample (by its index along each axis) of each row of boxes that the cell
-    /// reaches and the overlaps of the boxes from there to the last that it reaches, negative for facets that
-    /// look inward. The sums that make them may leave roundings in boxes that the cell just misses.
+    /// Calls `visit` for each row of boxes that the cell reaches, with the first sample (its index along each axis) and
+    /// the overlaps from there to the last box that the cell reaches. Overlaps are negative if facets look inward. Boxes
+    /// that the cell just misses may have roundings for overlaps.
     pub fn each_row(&mut self, surface: &Surface, mut visit: impl FnMut([usize; 3], &[f64])) {
         let Some((first, last)) = self.reach(surface) else { return };
         self.rows.cut = surface.corners.iter().any(|p| p[0] <= 0.0);
@@ -106,7 +105,7 @@ impl Overlaps {
         }
     }
 
-    /// The first and the last boxes along each axis that the surface may reach; `None` if there are none.
+    /// The first and the last boxes along each axis that the surface may reach; `None` if it reaches none.
     fn reach(&self, surface: &Surface) -> Option<([usize; 3], [usize; 3])> {
         let (mut first, mut last) = ([0; 3], [0; 3]);
         for k in 0..3 {
@@ -139,13 +138,13 @@ impl Overlaps {
 struct Rows {
     first: [usize; 2],
     shape: [usize; 2],
-    /// Whether the cell may begin at box 0 or before, where no piece tells of it: then rows fill from there.
+    /// Whether the cell may begin in box 0 or before, where no pieces are kept: then rows are filled from box 0.
     cut: bool,
-    /// The first and the last boxes of each row that pieces are in.
+    /// The first and the last box of each row that has a piece.
     reached: Vec<[usize; 2]>,
-    /// The part of its own box that lies between a piece and the lower side, for each box.
+    /// For each box, the volume between its pieces and its lower side.
     own: Vec<f64>,
-    /// The shadows of the pieces in each box, and one after the last box for all beyond.
+    /// The shadows of the pieces in each box, and after the last box those of all pieces beyond.
     shadows: Vec<f64>,
     overlaps: Vec<f64>,
 }

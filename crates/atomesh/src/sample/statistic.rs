@@ -1,4 +1,4 @@
-//! What can be said about the samples in a cell, and the sums it is made from.
+//! Statistics of the samples in a cell, and the sums that they are made from.
 
 use std::fmt;
 use std::str::FromStr;
@@ -22,7 +22,7 @@ pub enum Statistic {
     Max,
     /// The label that fills the most of the cell; of equal ones the lowest.
     Majority,
-    /// The share of the part that has samples that this label fills: OOF's homogeneity.
+    /// The share of the majority's label in the part of the cell that has samples: OOF's homogeneity.
     Homogeneity,
     /// The integral Σ w v, w in world units: a density becomes a mass. 0 without samples.
     Total,
@@ -68,7 +68,7 @@ impl Statistic {
         }
     }
 
-    /// Whether it takes a logarithm or an inverse, and so no sample below 0.
+    /// Whether it takes a logarithm or an inverse, and so needs samples of 0 or more.
     pub fn needs_positive(self) -> bool {
         matches!(self, Self::Harmonic | Self::Geometric)
     }
@@ -85,7 +85,7 @@ impl fmt::Display for Statistic {
     }
 }
 
-/// A name that no statistic has.
+/// The error for a name that no statistic has.
 #[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
 #[error("no statistic is named {name:?}; expected one of {}", Statistic::NAMES.join(", "))]
 pub struct UnknownStatistic {
@@ -111,7 +111,7 @@ pub(super) struct Tally {
     counts_labels: bool,
     /// Overlaps up to this are slivers or roundings.
     least_overlap: f64,
-    /// Σ w v over them: they are no part of the cell's statistics, but of its total.
+    /// Σ w v over slivers, which count only in the total.
     slivers: f64,
     /// Σ w.
     pub weight: f64,
@@ -157,7 +157,7 @@ impl Tally {
         self.labels.clear();
     }
 
-    /// Adds a sample. One that is not finite is none.
+    /// Adds a sample; one that is not finite is ignored.
     #[inline]
     pub fn add(&mut self, value: f64, overlap: f64) {
         if !value.is_finite() {
@@ -196,7 +196,7 @@ impl Tally {
         self.labels[self.last_label].1 += overlap;
     }
 
-    /// The label that fills the most, and how much it fills.
+    /// The label that fills the most, and its overlap.
     fn majority(&self) -> (f64, f64) {
         let greatest = self.labels.iter().fold(0.0_f64, |most, (_, overlap)| most.max(*overlap));
         let enough = greatest - TIE * self.weight;

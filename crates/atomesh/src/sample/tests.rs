@@ -1,8 +1,8 @@
-//! Overlaps against a slow twin, statistics against closed forms, totals against sums.
+//! Overlaps against a slow reference, statistics against closed forms, totals against sums.
 
 use super::*;
 use crate::geometry::{Bounds, Simplex, difference};
-use crate::mesh::Delaunay;
+use crate::mesh::{Delaunay, Mesh};
 use crate::watch::Silent;
 use proptest::prelude::*;
 use std::ops::ControlFlow;
@@ -37,7 +37,7 @@ fn below<const D: usize>(
     }
 }
 
-/// The simplices that fill the part of a simplex in a box: the twin, clipped by one side after another.
+/// The simplices that fill the part of a simplex in a box: the reference, clipped by one side after another.
 fn clipped<const D: usize>(simplex: &[Point<D>], bounds: &Bounds<D>) -> Vec<Vec<Point<D>>> {
     let mut parts = vec![simplex.to_vec()];
     for k in 0..D {
@@ -82,7 +82,7 @@ fn overlaps<const D: usize>(mesh: &Mesh<D>, shape: [usize; D]) -> Vec<f64> {
             samples[i] = 1.0;
             let options = SampleOptions::new(&[Statistic::Total]);
             let samples = Samples::F64(samples);
-            sample_placed(mesh, (&frame, &samples), options, &mut Silent).unwrap().values[0][0]
+            sample_placed(mesh, &frame, &samples, options, &mut Silent).unwrap().values[0][0]
         })
         .collect()
 }
@@ -220,7 +220,7 @@ fn the_mean_of_a_linear_image_is_the_value_at_the_centroid() {
 /// A box as a cell: six facets, which simplices have not.
 struct Box3(Bounds<3>);
 
-impl Cells<3> for Box3 {
+impl CellSurfaces<3> for Box3 {
     fn cell_count(&self) -> usize {
         1
     }
@@ -327,8 +327,8 @@ fn wrong_samples_are_refused() {
     let error = |shape: [usize; 2], samples: Vec<f32>, statistic| {
         let frame = Frame::new(shape).unwrap();
         let kinds = [statistic];
-        let placed = (&frame, &Samples::F32(samples));
-        sample_placed(&mesh, placed, SampleOptions::new(&kinds), &mut Silent).err()
+        let (samples, options) = (Samples::F32(samples), SampleOptions::new(&kinds));
+        sample_placed(&mesh, &frame, &samples, options, &mut Silent).err()
     };
     assert_eq!(error([2, 2], vec![0.0; 4], Statistic::Mean), None);
     assert_eq!(error([4, 1], vec![0.0; 4], Statistic::Mean), Some(SampleError::Thin { axis: 1 }));

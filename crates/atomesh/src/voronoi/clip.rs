@@ -1,16 +1,17 @@
 //! Cutting the loops by the sides of the box.
 //!
-//! Only loops with a corner on or beyond a side are touched. A point within the tolerance of a side is on it, and
-//! moved there; an edge from inside to outside is cut once, whichever loop comes first. What the faces of a cell
-//! leave open on a side, the edges there that no other face runs back along, are the border of the face that
-//! closes it. That is so however thin the cells are and whatever rounding did, since it asks no coordinates.
+//! Only loops with a corner on or beyond a side are touched. A point within the tolerance of a side is on it, and is
+//! moved there. An edge from inside to outside is cut once, by the loop that comes first. The edges of a cell's faces on
+//! a side that no other of its faces runs back along are the border of the face that closes the cell there. This holds
+//! for cells however thin, and whatever the rounding, since it depends on no coordinates.
 
 use std::collections::HashMap;
 
-use super::dual::{Dual, Loops, NONE, Place};
+use super::dual::{Domain, Dual, Loops, NONE};
 use crate::geometry::Point;
 
-/// A loop that meets the box, with its cells as in [`Loops`]; on a side, the second is the side's, [`of_side`].
+/// A loop that meets a side of the box, with its cells as in [`Loops`]. The second cell of a loop on a side is
+/// [`of_side`].
 pub(super) struct Rim {
     pub corners: Vec<u32>,
     pub cells: [u32; 2],
@@ -26,18 +27,18 @@ pub(super) struct Cut<const D: usize> {
     pub rim: Vec<Rim>,
 }
 
-/// In place of a cell: side `side` of the box, 2 · axis, and 1 more at its end.
+/// The number that stands for a side of the box in place of a cell. Sides are 2 · axis, and 1 more at the axis' end.
 pub(super) fn of_side(side: usize) -> u32 {
     NONE - 1 - side as u32
 }
 
-/// The side, if it is one.
+/// The side for which a cell's number stands, if it does.
 pub(super) fn side_of<const D: usize>(cell: u32) -> Option<usize> {
     let side = (NONE - 1).wrapping_sub(cell) as usize;
     (side < 2 * D).then_some(side)
 }
 
-/// Where a point is, seen from a side.
+/// Where a point is, relative to a side.
 #[derive(Clone, Copy, PartialEq, Eq)]
 enum State {
     Inside,
@@ -45,9 +46,10 @@ enum State {
     Beyond,
 }
 
-pub(super) fn clip<const D: usize>(dual: Dual<D>, place: &Place<D>) -> Cut<D> {
+/// Cuts the complex by all sides of the box.
+pub(super) fn clip<const D: usize>(dual: Dual<D>, domain: &Domain<D>) -> Cut<D> {
     let sides = vec![0; dual.points.len()];
-    let mut cutter = Cutter { points: dual.points, sides, place };
+    let mut cutter = Cutter { points: dual.points, sides, domain };
     let meets: Vec<bool> = (0..cutter.points.len() as u32)
         .map(|p| (0..2 * D).any(|s| cutter.state(p, s) != State::Inside))
         .collect();
@@ -72,12 +74,13 @@ pub(super) fn clip<const D: usize>(dual: Dual<D>, place: &Place<D>) -> Cut<D> {
 struct Cutter<'a, const D: usize> {
     points: Vec<Point<D>>,
     sides: Vec<u8>,
-    place: &'a Place<D>,
+    domain: &'a Domain<D>,
 }
 
 impl<const D: usize> Cutter<'_, D> {
+    /// The coordinate of a side along its axis.
     fn level(&self, side: usize) -> f64 {
-        let bounds = &self.place.bounds;
+        let bounds = &self.domain.bounds;
         if side.is_multiple_of(2) { bounds.min[side / 2] } else { bounds.max[side / 2] }
     }
 
@@ -88,13 +91,13 @@ impl<const D: usize> Cutter<'_, D> {
         let above = self.points[point as usize][side / 2] - self.level(side);
         let beyond = if side.is_multiple_of(2) { -above } else { above };
         match beyond {
-            b if b > self.place.tolerance => State::Beyond,
-            b if b < -self.place.tolerance => State::Inside,
+            b if b > self.domain.tolerance => State::Beyond,
+            b if b < -self.domain.tolerance => State::Inside,
             _ => State::On,
         }
     }
 
-    /// What is left of the loops on the inner side of a side.
+    /// The parts of the loops inside of a side.
     fn cut(&mut self, loops: Vec<Rim>, side: usize) -> Vec<Rim> {
         let mut crossings = HashMap::new();
         let mut kept = Vec::with_capacity(loops.len());
@@ -118,6 +121,7 @@ impl<const D: usize> Cutter<'_, D> {
         kept
     }
 
+    /// The part of one loop inside of a side; `crossings` holds the points at which edges were cut before.
     fn cut_one(
         &mut self,
         corners: &[u32],
@@ -161,7 +165,7 @@ impl<const D: usize> Cutter<'_, D> {
 /// The faces that close cells on a side.
 fn lids(rim: &[Rim], sides: &[u8], side: usize, site_count: usize) -> Vec<Rim> {
     let is_on = |c: u32| sides[c as usize] >> side & 1 == 1;
-    // (cell, from, to) of every edge on the side, run through as the lid would
+    // cell, start and end of every edge on the side, in the direction in which the closing face has it
     let mut edges: Vec<[u32; 3]> = Vec::new();
     for Rim { corners, cells } in rim {
         for at in 0..corners.len() {

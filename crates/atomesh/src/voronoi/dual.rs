@@ -1,4 +1,7 @@
 //! From Delaunay's mesh to loops of circumcentres.
+//!
+//! A face between two cells (3-D), or a cell (2-D), is the loop of the circumcentres of the Delaunay cells around an edge,
+//! or around a site.
 
 use rayon::prelude::*;
 
@@ -11,14 +14,14 @@ use crate::watch::Watch;
 /// Sites whose loops one task makes.
 const BLOCK: usize = 1 << 10;
 
-/// In place of a cell: there is none (2-D, where loops are cells).
+/// In place of a cell: none (2-D, where loops are cells themselves).
 pub(super) const NONE: u32 = u32::MAX;
 
-/// Below this volume of the parallelepiped of its unit edges, a cell's circumcentre is nothing but rounding.
+/// Below this volume of the parallelepiped of its unit edges, a cell's circumcentre is lost to rounding.
 const FLAT: f64 = 1e-14;
 
 /// The box and the tolerances.
-pub(super) struct Place<const D: usize> {
+pub(super) struct Domain<const D: usize> {
     pub bounds: Bounds<D>,
     /// How far a vertex may be moved off a plane.
     pub tolerance: f64,
@@ -33,8 +36,8 @@ pub(super) struct Loops {
     pub corners: Vec<u32>,
     /// Where each loop ends.
     pub ends: Vec<usize>,
-    /// The cell that sees a loop run counter-clockwise from outside, and the other one; in 2-D the cell, and
-    /// [`NONE`]. Ghosts have numbers beyond the sites'.
+    /// The cell from whose outside a loop runs counter-clockwise, and the other one; in 2-D the cell, and [`NONE`].
+    /// Ghosts have numbers beyond the sites'.
     pub cells: Vec<[u32; 2]>,
 }
 
@@ -59,7 +62,7 @@ impl Loops {
 pub(super) struct Dual<const D: usize> {
     pub points: Vec<Point<D>>,
     pub loops: Loops,
-    /// Sites; what has a greater number is a ghost.
+    /// The number of sites; cells of greater numbers are the ghosts'.
     pub site_count: usize,
 }
 
@@ -67,11 +70,11 @@ pub(super) struct Dual<const D: usize> {
 pub(super) fn dual<const D: usize>(
     delaunay: &Delaunay<D>,
     sites: &[Point<D>],
-    place: &Place<D>,
+    domain: &Domain<D>,
     watch: &mut dyn Watch,
 ) -> Result<Dual<D>, VoronoiError> {
     let mut points = sites.to_vec();
-    points.extend(ghosts(&place.bounds));
+    points.extend(ghosts(&domain.bounds));
     let mesh = delaunay.connect(&points, watch)?;
     let spheres: Vec<Sphere<D>> = mesh
         .corners()
@@ -80,21 +83,21 @@ pub(super) fn dual<const D: usize>(
         .map(|cell| Sphere::of(&mesh.simplex(cell)))
         .collect();
     let cells = mesh.cells_of_points();
-    let rings = Rings { mesh: &mesh, spheres: &spheres, cells, sites: sites.len(), place };
+    let rings = Rings { mesh: &mesh, spheres: &spheres, cells, sites: sites.len(), domain };
     let blocks: Vec<Block> = (0..sites.len().div_ceil(BLOCK))
         .into_par_iter()
         .map(|b| rings.block(b * BLOCK..((b + 1) * BLOCK).min(sites.len())))
         .collect();
     if let Some((sites, squared)) = blocks.iter().find_map(|block| block.close) {
-        let (distance, least) = (squared.sqrt(), place.least_gap);
+        let (distance, least) = (squared.sqrt(), domain.least_gap);
         return Err(VoronoiError::Close { sites: sites.map(|i| i as usize), distance, least });
     }
     let groups = group(&spheres, &blocks);
     Ok(Dual { loops: join(blocks, &groups.of), points: groups.points, site_count: sites.len() })
 }
 
-/// Points so far outside that every point of the box is nearer to any site: twice as many as there are axes,
-/// with the box well inside their hull.
+/// Points so far outside that every point of the box is nearer to any site: two for each axis, with the box well inside
+/// their hull.
 fn ghosts<const D: usize>(bounds: &Bounds<D>) -> Vec<Point<D>> {
     let extent = bounds.extent();
     let far = 4.0 * extent.iter().sum::<f64>();
@@ -113,16 +116,16 @@ fn ghosts<const D: usize>(bounds: &Bounds<D>) -> Vec<Point<D>> {
 struct Sphere<const D: usize> {
     /// A corner of the cell.
     anchor: Point<D>,
-    /// The centre, seen from there.
-    center: Point<D>,
-    /// The volume of the parallelepiped of the unit edges at the anchor: how well the centre is known.
+    /// The centre, from there.
+    offset: Point<D>,
+    /// The volume of the parallelepiped of the unit edges at the anchor: how well conditioned the centre is.
     solidity: f64,
 }
 
 impl<const D: usize> Sphere<D> {
-    /// Solves c · e = ½ |e|² for the edges e from one corner, each divided by its length: rows of one size,
-    /// so that elimination leaves the centre on every bisecting plane to a rounding, also where the cell is
-    /// thin. The corner is one of the shortest edge, whose plane would suffer most.
+    /// Solves c · e = ½ |e|² for the edges e from one corner, each divided by its length. With rows of one size,
+    /// elimination leaves the centre on every bisecting plane to a rounding, even in a thin cell. The corner is an end of
+    /// the shortest edge, whose plane would suffer most.
     fn of(simplex: &Simplex<D>) -> Self {
         let at = |k: usize| if k == 0 { simplex.first } else { simplex.others[k - 1] };
         let mut shortest = (f64::INFINITY, 0);
@@ -143,22 +146,22 @@ impl<const D: usize> Sphere<D> {
             right[row] = [0.5 * length];
         }
         let solidity = solve(D, rows, &mut right).abs();
-        let center = right.map(|[x]| x);
-        if solidity > FLAT && center.iter().all(|x| x.is_finite()) {
-            return Self { anchor, center, solidity };
+        let offset = right.map(|[x]| x);
+        if solidity > FLAT && offset.iter().all(|x| x.is_finite()) {
+            return Self { anchor, offset, solidity };
         }
         let mean = |k: usize| (0..=D).map(|c| at(c)[k] - anchor[k]).sum::<f64>() / (D + 1) as f64;
-        Self { anchor, center: std::array::from_fn(mean), solidity: 0.0 }
+        Self { anchor, offset: std::array::from_fn(mean), solidity: 0.0 }
     }
 
-    fn place(&self) -> Point<D> {
-        std::array::from_fn(|k| self.anchor[k] + self.center[k])
+    fn center(&self) -> Point<D> {
+        std::array::from_fn(|k| self.anchor[k] + self.offset[k])
     }
 
-    /// How far the centre is from the plane that bisects a point of the sphere and `q`, `gap` from it.
+    /// The distance of the centre from the plane that bisects `q` and a point of the sphere, which is `gap` from it.
     fn miss(&self, q: &Point<D>, gap: f64) -> f64 {
         let v = difference(q, &self.anchor);
-        (dot(&v, &v) - 2.0 * dot(&v, &self.center)).abs() / (2.0 * gap)
+        (dot(&v, &v) - 2.0 * dot(&v, &self.offset)).abs() / (2.0 * gap)
     }
 }
 
@@ -168,23 +171,39 @@ struct Block {
     loops: Loops,
     /// Neighbouring cells with one centre.
     merges: Vec<[u32; 2]>,
-    /// A cell that is on the sphere of a neighbour of better shape, how far it is from being so, and that one.
-    leans: Vec<(u32, f64, u32)>,
+    leans: Vec<Lean>,
     /// Two sites that are too near each other, and their squared distance.
     close: Option<([u32; 2], f64)>,
 }
 
-/// A cell around a loop: the loop's other site ([`NONE`] in 2-D), the corner before and the corner after, seen
-/// counter-clockwise, and the cell.
-type Link = [u32; 4];
+/// A cell whose far corner is on the sphere of a neighbour of better shape.
+#[derive(Clone, Copy)]
+struct Lean {
+    cell: u32,
+    /// How far a vertex moves off its plane if it is put at the neighbour's centre.
+    miss: f64,
+    neighbour: u32,
+}
 
-/// Delaunay's mesh, ready to be asked for the cells around a site.
+/// A cell around a loop.
+#[derive(Clone, Copy, PartialEq, Eq, PartialOrd, Ord)]
+struct Link {
+    /// The loop's other site; [`NONE`] in 2-D.
+    other: u32,
+    /// The corner before, seen counter-clockwise.
+    before: u32,
+    /// The corner after.
+    after: u32,
+    cell: u32,
+}
+
+/// Delaunay's mesh, and the cells around each of its sites.
 struct Rings<'a, const D: usize> {
     mesh: &'a Mesh<D>,
     spheres: &'a [Sphere<D>],
     cells: CellsOfPoints,
     sites: usize,
-    place: &'a Place<D>,
+    domain: &'a Domain<D>,
 }
 
 impl<const D: usize> Rings<'_, D> {
@@ -194,7 +213,7 @@ impl<const D: usize> Rings<'_, D> {
             links.clear();
             self.links(site, &mut links, &mut block);
             links.sort_unstable();
-            for ring in links.chunk_by(|a, b| a[0] == b[0]) {
+            for ring in links.chunk_by(|a, b| a.other == b.other) {
                 self.ring(site as u32, ring, &mut block);
             }
         }
@@ -204,7 +223,7 @@ impl<const D: usize> Rings<'_, D> {
     /// The links of all loops of a site: of its cell in 2-D, of its faces to sites of greater number in 3-D.
     fn links(&self, site: usize, links: &mut Vec<Link>, block: &mut Block) {
         let (points, corners) = (self.mesh.points(), self.mesh.corners());
-        let least = self.place.least_gap.powi(2);
+        let least = self.domain.least_gap.powi(2);
         for &cell in self.cells.of(site as u32) {
             let cell_corners = &corners[cell as usize * (D + 1)..(cell as usize + 1) * (D + 1)];
             let at = cell_corners.iter().position(|&c| c as usize == site).unwrap_or(0);
@@ -220,13 +239,13 @@ impl<const D: usize> Rings<'_, D> {
                 }
             }
             if D == 2 {
-                links.push([NONE, others[0], others[1], cell]);
+                links.push(Link { other: NONE, before: others[0], after: others[1], cell });
                 continue;
             }
             for k in 0..D {
-                let [axis, before, after] = [0, 1, 2].map(|n| others[(k + n) % D]);
-                if axis as usize > site {
-                    links.push([axis, before, after, cell]);
+                let [other, before, after] = [0, 1, 2].map(|n| others[(k + n) % D]);
+                if other as usize > site {
+                    links.push(Link { other, before, after, cell });
                 }
             }
         }
@@ -234,30 +253,30 @@ impl<const D: usize> Rings<'_, D> {
 
     /// Follows the links around, as a loop of cells.
     fn ring(&self, site: u32, ring: &[Link], block: &mut Block) {
-        let other = ring[0][0];
         let mut at = ring[0];
         for _ in 0..ring.len() {
-            block.loops.corners.push(at[3]);
+            block.loops.corners.push(at.cell);
             // ghosts surround all sites, so the ring is closed
-            let Ok(next) = ring.binary_search_by(|link| link[1].cmp(&at[2])) else { break };
+            let Ok(next) = ring.binary_search_by(|link| link.before.cmp(&at.after)) else { break };
             let next = ring[next];
-            self.compare(site, (at, next), block);
+            self.compare(site, at, next, block);
             at = next;
         }
         block.loops.ends.push(block.loops.corners.len());
-        block.loops.cells.push([site, other]);
+        block.loops.cells.push([site, at.other]);
     }
 
-    /// Whether two cells that follow each other around a loop lie on one sphere. Each facet is looked at once.
-    fn compare(&self, site: u32, (at, next): (Link, Link), block: &mut Block) {
-        let (other, shared) = (at[0], at[2]);
+    /// Notes whether two cells that follow each other around a loop lie on one sphere. Each facet is looked at once.
+    fn compare(&self, site: u32, at: Link, next: Link, block: &mut Block) {
+        let (other, shared) = (at.other, at.after);
         let last = if other == NONE { site } else { other };
         if shared < last {
             return;
         }
-        let (a, b) = (&self.spheres[at[3] as usize], &self.spheres[next[3] as usize]);
-        // the sphere that is known better, and the corner of the other cell off it
-        let (sphere, apex) = if a.solidity >= b.solidity { (a, next[2]) } else { (b, at[1]) };
+        let (a, b) = (&self.spheres[at.cell as usize], &self.spheres[next.cell as usize]);
+        // the better conditioned sphere, and the corner of the other cell that it has not
+        let (sphere, apex) =
+            if a.solidity >= b.solidity { (a, next.after) } else { (b, at.before) };
         if sphere.solidity == 0.0 {
             return;
         }
@@ -267,27 +286,27 @@ impl<const D: usize> Rings<'_, D> {
         let squared = corners.map(|c| distance_squared(apex, &points[c as usize]));
         let gap = squared.fold(f64::INFINITY, f64::min).sqrt();
         let [lesser, better] =
-            if a.solidity >= b.solidity { [next[3], at[3]] } else { [at[3], next[3]] };
-        let (tolerance, is_flat) = (self.place.tolerance, a.solidity.min(b.solidity) == 0.0);
-        if !is_flat && distance_squared(&a.place(), &b.place()) <= tolerance.powi(2) {
+            if a.solidity >= b.solidity { [next.cell, at.cell] } else { [at.cell, next.cell] };
+        let (tolerance, is_flat) = (self.domain.tolerance, a.solidity.min(b.solidity) == 0.0);
+        if !is_flat && distance_squared(&a.center(), &b.center()) <= tolerance.powi(2) {
             block.merges.push([lesser, better]);
             return;
         }
         let miss = sphere.miss(apex, gap);
         if miss <= tolerance || is_flat {
-            block.leans.push((lesser, miss, better));
+            block.leans.push(Lean { cell: lesser, miss, neighbour: better });
         }
     }
 }
 
-/// Which vertex each cell of Delaunay's mesh is, and where the vertices are.
+/// The vertex that each cell of Delaunay's mesh becomes, and where the vertices are.
 struct Groups<const D: usize> {
     of: Vec<u32>,
     points: Vec<Point<D>>,
 }
 
-/// Cells with one centre are one vertex. A thin cell, whose corners are nearly on one circle, is at home anywhere
-/// along the circle's axis: it becomes one with one neighbour, never with two, which may be far apart.
+/// Cells with one centre are one vertex. The centre of a thin cell, whose corners are nearly on one circle, may be
+/// anywhere along the circle's axis: the cell becomes one with one neighbour, never with two, which may be far apart.
 fn group<const D: usize>(spheres: &[Sphere<D>], blocks: &[Block]) -> Groups<D> {
     let mut sets = Sets::new(spheres.len());
     let mut is_joined = vec![false; spheres.len()];
@@ -297,11 +316,14 @@ fn group<const D: usize>(spheres: &[Sphere<D>], blocks: &[Block]) -> Groups<D> {
         is_joined[b as usize] = true;
     }
     let leans = blocks.iter().flat_map(|block| block.leans.iter().copied());
-    let mut leans: Vec<_> = leans.filter(|lean| !is_joined[lean.0 as usize]).collect();
-    leans.sort_by(|a, b| a.0.cmp(&b.0).then(a.1.total_cmp(&b.1)).then(a.2.cmp(&b.2)));
-    leans.dedup_by_key(|lean| lean.0);
-    for (cell, _, on) in leans {
-        sets.join(cell, on);
+    let mut leans: Vec<_> = leans.filter(|lean| !is_joined[lean.cell as usize]).collect();
+    leans.sort_by(|a, b| {
+        let by_miss = a.cell.cmp(&b.cell).then(a.miss.total_cmp(&b.miss));
+        by_miss.then(a.neighbour.cmp(&b.neighbour))
+    });
+    leans.dedup_by_key(|lean| lean.cell);
+    for lean in leans {
+        sets.join(lean.cell, lean.neighbour);
     }
     let (mut of, mut best) = (vec![0; spheres.len()], Vec::<u32>::new());
     for cell in 0..spheres.len() {
@@ -317,11 +339,11 @@ fn group<const D: usize>(spheres: &[Sphere<D>], blocks: &[Block]) -> Groups<D> {
             }
         }
     }
-    let points = best.iter().map(|&cell| spheres[cell as usize].place()).collect();
+    let points = best.iter().map(|&cell| spheres[cell as usize].center()).collect();
     Groups { of, points }
 }
 
-/// All loops one after another, of vertices.
+/// The loops of all blocks, one after another, as loops of vertices.
 fn join(blocks: Vec<Block>, vertex_of: &[u32]) -> Loops {
     let mut loops = Loops::default();
     let mut ring = Vec::new();

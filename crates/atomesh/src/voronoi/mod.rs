@@ -1,56 +1,43 @@
 //! Voronoi (PEBI) meshes: from sites in a box to the cells of points nearest to each, clipped to the box.
 //!
-//! Assumes sites inside the box or on its boundary, no two nearer than [`LEAST_GAP`] of the mean distance.
-//! Sites on the boundary stay sites: their cells are cut by the box and lie on one side of them, half a cell at
-//! a side, a quarter at an edge. Whoever simulates flow then has an unknown on the boundary itself.
+//! Assumes sites inside the box or on its boundary, no two nearer than [`LEAST_GAP`] of the mean distance. Sites on the
+//! boundary stay sites: the box cuts their cells, so that they lie on one side of them, half a cell at a side, a quarter
+//! at an edge. A flow simulation then has an unknown on the boundary itself.
 //!
-//! Degenerate sites are the normal case: on a perfect crystal many cells of Delaunay's mesh share one
-//! circumsphere, and rounding moves their circumcentres apart or, for flat cells, anywhere. So nothing is cut
-//! cell by cell; each step decides once for all cells that share what it decides on, and the complex is closed
-//! whatever the rounding was:
+//! Degenerate sites are the normal case. On a perfect crystal many cells of Delaunay's mesh share one circumsphere, and
+//! rounding moves their circumcentres apart or, for flat cells, anywhere. So nothing is cut cell by cell. Each step
+//! decides once for all cells that share what it decides on, and the complex is closed whatever the rounding:
 //!
-//! 1. `dual`: Delaunay's mesh of the sites and of a few *ghosts* far outside, which make every cell bounded and
-//!    touch nothing inside the box. One loop of circumcentres a facet-to-be: around each edge in 3-D, around each
-//!    site in 2-D. Neighbouring cells with one centre are one vertex. A cell whose far corner lies on the sphere
-//!    of a neighbour of better shape, to the tolerance by which that moves a bisecting plane, takes the place of
-//!    that neighbour: the less its own centre can be known, the less it matters where on its axis it is.
-//! 2. `clip`: the loops are cut by one side of the box after another. An edge is cut in one place, shared by all
-//!    its loops; in 3-D what a cell's faces leave open on the side is the face that closes it.
-//! 3. `tidy`: edges shorter than the tolerance are drawn together, for all faces at once; faces of fewer than
-//!    three corners vanish; points and faces are numbered.
+//! 1. `dual`: Delaunay's mesh of the sites and of a few *ghosts* far outside, which make every cell bounded and touch
+//!    nothing inside the box. One loop of circumcentres for each face (3-D), around an edge, or each cell (2-D), around a
+//!    site. Neighbouring cells with one centre are one vertex. If the far corner of a cell lies on the sphere of a
+//!    neighbour of better shape, to the tolerance by which that moves a bisecting plane, the cell takes the neighbour's
+//!    centre: the worse its own centre is conditioned, the less it matters where on its axis it is.
+//! 2. `clip`: the loops are cut by one side of the box after another. An edge is cut in one place, shared by all its
+//!    loops. In 3-D, what a cell's faces leave open on the side is the face that closes it.
+//! 3. `weld`: the ends of edges shorter than the tolerance are merged, for all faces at once; faces of fewer than three
+//!    corners vanish; points and faces are numbered.
 //!
-//! The tolerance is 10⁻¹¹ of the mean distance of sites (or 64 roundings of a coordinate, if that is more), so
-//! faces are planar to some 10⁻¹⁰ of it. The other routes were no better: cutting each cell by half-spaces makes
-//! every cell right by itself and leaves it to luck whether neighbours agree; mirrored sites do not serve sites on
-//! the box itself. Cost: that of connecting the sites, and about as much again; the same at any thread count.
+//! The tolerance is 10⁻¹¹ of the mean distance of sites (or 64 roundings of a coordinate, if that is more), so faces are
+//! planar to some 10⁻¹⁰ of it. Two other routes were worse: cutting each cell by half-spaces makes every cell right by
+//! itself, but neighbours may disagree; mirrored sites do not serve sites on the box itself. Cost: that of connecting the
+//! sites, and about as much again. The result is the same at any thread count.
 
 mod clip;
-mod connections;
 mod dual;
-mod marks;
-mod poly_mesh;
-mod report;
-mod sampled;
-mod tidy;
-mod validate;
 #[cfg(test)]
 mod tests;
-
-pub use connections::{BoundaryConnection, Connection, boundary_connections, connections};
-pub use marks::{FeatureFaces, feature_faces};
-pub use poly_mesh::{PolyMesh, side_name};
-pub use report::PolyReport;
-pub use validate::PolyFault;
+mod weld;
 
 use crate::geometry::{Bounds, Point, distance_squared};
-use crate::mesh::{ConnectError, Delaunay, Mesh};
+use crate::mesh::{ConnectError, Delaunay, Mesh, PolyFault, PolyMesh, mean_distance};
 use crate::watch::{Cancelled, Phase, Watch, check};
 
 /// The tolerance as a share of the mean distance of sites.
 const TOLERANCE: f64 = 1e-11;
 
-/// The least distance of two sites, as a share of the mean distance (V/n)^(1/D): nearer ones have a
-/// bisecting plane that rounding turns.
+/// The least distance of two sites, as a share of the mean distance (V/n)^(1/D): rounding turns the bisecting plane of
+/// nearer ones.
 pub const LEAST_GAP: f64 = 1e-6;
 
 /// Why there are no cells.
@@ -89,7 +76,7 @@ pub enum VoronoiError {
     /// The sites could not be connected.
     #[error(transparent)]
     Connect(ConnectError),
-    /// The cells do not keep what they promise.
+    /// The cells do not make a mesh.
     #[error(transparent)]
     Fault(#[from] PolyFault),
     /// The caller ended the work.
@@ -136,19 +123,17 @@ pub fn voronoi<const D: usize>(
     let spacing = mean_distance(&bounds, sites.len());
     let largest = (0..D).fold(0.0_f64, |m, k| m.max(bounds.min[k].abs()).max(bounds.max[k].abs()));
     let tolerance = (TOLERANCE * spacing).max(64.0 * f64::EPSILON * largest);
-    let place = dual::Place { bounds, tolerance, least_gap: LEAST_GAP * spacing };
-    let dual = dual::dual(delaunay, sites, &place, watch)?;
+    let domain = dual::Domain { bounds, tolerance, least_gap: LEAST_GAP * spacing };
+    let dual = dual::dual(delaunay, sites, &domain, watch)?;
     check(watch, Phase::Connect, 1.0, None)?;
-    let cut = clip::clip(dual, &place);
+    let cut = clip::clip(dual, &domain);
     check(watch, Phase::Connect, 1.0, None)?;
-    let mesh = tidy::tidy(cut, sites, &place)?;
-    mesh.check_cells()?;
-    Ok(mesh)
+    Ok(weld::weld(cut, sites, &domain)?)
 }
 
-/// The points of a Delaunay mesh that are fit for sites in a box: of two nearer to each other than
-/// [`LEAST_GAP`] allows, such as atoms drawn to one place by the image alone, the first. Nearest points share
-/// an edge of the mesh, so its edges tell. Cost: O(cells).
+/// The points of a Delaunay mesh that may be sites in a box: of two nearer to each other than [`LEAST_GAP`] allows, such
+/// as atoms drawn to one place by the image alone, only the first. Nearest points share an edge of the mesh, so only
+/// edges are checked. Cost: O(cells).
 pub fn sites_apart<const D: usize>(mesh: &Mesh<D>, bounds: &Bounds<D>) -> Vec<Point<D>> {
     let points = mesh.points();
     // twice the gap: without some sites, the mean distance of the others is a little more
@@ -164,11 +149,6 @@ pub fn sites_apart<const D: usize>(mesh: &Mesh<D>, bounds: &Bounds<D>) -> Vec<Po
         }
     }
     points.iter().zip(is_site).filter(|(_, is_site)| *is_site).map(|(p, _)| *p).collect()
-}
-
-/// (V/n)^(1/D), the mean distance of n sites.
-pub(crate) fn mean_distance<const D: usize>(bounds: &Bounds<D>, count: usize) -> f64 {
-    (bounds.measure() / count as f64).powf(1.0 / D as f64)
 }
 
 fn check_sites<const D: usize>(sites: &[Point<D>], bounds: &Bounds<D>) -> Result<(), VoronoiError> {

@@ -1,7 +1,10 @@
 use super::*;
+use crate::features::feature_faces;
 use crate::fields::ScalarField;
 use crate::geometry::{difference, distance_squared, dot};
-use crate::image::Grid;
+use crate::image::{Frame, Grid, Image, Samples};
+use crate::mesh::{Connection, PolyParts, boundary_connections, connections};
+use crate::sample::{SampleOptions, Statistic, sample};
 use crate::watch::Silent;
 use proptest::prelude::*;
 use rand::{RngExt, SeedableRng};
@@ -373,4 +376,86 @@ where
 fn faces_of_features_lie_along_them() {
     faces_lie_along_features::<2>();
     faces_lie_along_features::<3>();
+}
+
+#[test]
+fn cells_have_all_of_an_image_between_them() {
+    let frame = Frame::new([7, 6, 5]).unwrap();
+    let samples: Vec<f32> = (0..210).map(|i| (i % 11) as f32).collect();
+    let image = Image::new(frame, Samples::F32(samples)).unwrap();
+    let bounds = Bounds { min: [0.0; 3], max: [6.0, 5.0, 4.0] };
+    let sites = [[1.0, 1.0, 1.0], [5.0, 1.5, 2.0], [3.0, 4.5, 3.0], [2.0, 3.0, 0.5]];
+    let cells = voronoi(&Delaunay::<3>::new(), &sites, bounds, &mut Silent).unwrap();
+    let options = SampleOptions::new(&[Statistic::Total, Statistic::Mean]);
+    let found = sample(&cells, &image, options, &mut Silent).unwrap();
+    let sum = |values: &[f64]| values.iter().sum::<f64>();
+    // roundings of some hundred sums
+    assert!((sum(&found.measures) - 120.0).abs() < 1e-10);
+    for (own, measure) in found.measures.iter().zip(cells.measures()) {
+        assert!((own - measure).abs() < 1e-10);
+    }
+    let by_means: f64 = found.values[1].iter().zip(&found.measures).map(|(m, v)| m * v).sum();
+    assert!((by_means - sum(&found.values[0])).abs() < 1e-9, "means weigh by volume");
+}
+
+/// The parts of a mesh, without its sites.
+fn parts<const D: usize>(mesh: &PolyMesh<D>) -> PolyParts<D> {
+    let ends = (0..mesh.face_count()).scan(0, |end, face| {
+        *end += mesh.face(face).len();
+        Some(*end)
+    });
+    let side_counts =
+        std::array::from_fn(|side| if side < 2 * D { mesh.side(side).len() } else { 0 });
+    PolyParts {
+        points: mesh.points().to_vec(),
+        corners: mesh.corners().to_vec(),
+        ends: ends.collect(),
+        owners: mesh.owners().to_vec(),
+        neighbours: mesh.neighbours().to_vec(),
+        side_counts,
+        sites: None,
+    }
+}
+
+fn cells_without_sites_have_the_same_shape<const D: usize>()
+where
+    Axes: Dimension<D>,
+{
+    let bounds = cube(4.0);
+    let mesh = cells(&scattered::<D>(40, 4.0, &mut Pcg64::seed_from_u64(3)), bounds);
+    let bare = PolyMesh::new(parts(&mesh)).unwrap();
+    assert_eq!(bare.validate(&bounds), Ok(()));
+    assert_eq!((bare.sites(), bare.cell_count()), (None, mesh.cell_count()));
+    assert_eq!(bare.centers(), bare.centroids());
+    for cell in 0..mesh.cell_count() {
+        // sums of some ten products of coordinates up to 4
+        assert!((bare.measures()[cell] - mesh.measures()[cell]).abs() < 1e-12);
+        let off = distance_squared(&bare.centroids()[cell], &mesh.centroids()[cell]).sqrt();
+        assert!(off * mesh.measures()[cell] < 1e-12, "cell {cell}: {off}");
+    }
+    let moved = bare.moved(true, |p| std::array::from_fn(|k| if k == 0 { -p[0] } else { p[k] }));
+    assert!((moved.measure() - bounds.measure()).abs() < 1e-10);
+}
+
+#[test]
+fn a_mesh_needs_no_sites() {
+    cells_without_sites_have_the_same_shape::<2>();
+    cells_without_sites_have_the_same_shape::<3>();
+}
+
+#[test]
+fn parts_that_do_not_fit_are_named() {
+    let whole = parts(&cells(&[[1.0, 1.0], [3.0, 1.0]], Bounds { min: [0.0; 2], max: [4.0, 2.0] }));
+    let fault = |change: &dyn Fn(&mut PolyParts<2>)| {
+        let mut parts = whole.clone();
+        change(&mut parts);
+        PolyMesh::new(parts).unwrap_err().to_string()
+    };
+    assert_eq!(fault(&|p| p.ends.truncate(6)), "6 ends of faces; expected 7");
+    assert_eq!(fault(&|p| p.side_counts[1] = 2), "8 faces inside and on sides; expected 7");
+    assert_eq!(fault(&|p| p.corners.push(0)), "15 corners; expected 14");
+    assert!(fault(&|p| p.ends[0] = 1).starts_with("face 0 has the points"));
+    assert_eq!(fault(&|p| p.corners[3] = 9), "face 1 names point 9; there are 6");
+    assert_eq!(fault(&|p| p.sites = Some(vec![[1.0; 2]])), "face 0 names cell 1; there are 1");
+    assert!(fault(&|p| p.points[0] = [f64::NAN; 2]).contains("has the measure"));
 }

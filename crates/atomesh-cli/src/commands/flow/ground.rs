@@ -2,11 +2,10 @@
 
 use std::path::Path;
 
-use atomesh::features::FeatureFacetOptions;
+use atomesh::features::{FeatureFaces, FeatureFacetOptions};
 use atomesh::image::{Frame, Image, Units};
-use atomesh::mesh::{Mesh, Tags};
+use atomesh::mesh::{Mesh, PolyMesh, Tags};
 use atomesh::run::Outcome;
-use atomesh::voronoi::{FeatureFaces, PolyMesh};
 use atomesh_flow::dg::{self, Form};
 use atomesh_flow::{FlowError, Grid, Problem, Setting, two_point};
 use atomesh_io::image::{AnyImage, ImageFormat};

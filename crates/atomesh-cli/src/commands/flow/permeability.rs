@@ -3,7 +3,7 @@
 use std::path::Path;
 
 use atomesh::image::Image;
-use atomesh::sample::{Cells, SampleError, SampleOptions, Statistic, sample};
+use atomesh::sample::{CellSurfaces, SampleError, SampleOptions, Statistic, sample};
 use atomesh_flow::Permeability;
 use atomesh_io::image::ImageFormat;
 
@@ -102,7 +102,7 @@ fn read<const D: usize>(
 
 /// The mean of the samples in each cell.
 fn means<const D: usize>(
-    cells: &impl Cells<D>,
+    cells: &impl CellSurfaces<D>,
     image: &Image<D>,
     statistic: Statistic,
     watch: &mut Progress,

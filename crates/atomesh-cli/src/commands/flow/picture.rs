@@ -2,9 +2,8 @@
 
 use atomesh::geometry::Point;
 use atomesh::image::Units;
-use atomesh::mesh::Mesh;
+use atomesh::mesh::{Mesh, PolyMesh};
 use atomesh::run::lattice_mesh;
-use atomesh::voronoi::PolyMesh;
 use atomesh_draw::{FlowCells, FlowLine, FlowPicture, FlowStyle, FlowWell, Picture, Style};
 use atomesh_flow::streamlines::Streamline;
 

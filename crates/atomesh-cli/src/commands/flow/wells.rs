@@ -3,7 +3,7 @@
 use std::fmt;
 use std::str::FromStr;
 
-use atomesh::features::is_feature_name;
+use atomesh::mesh::is_feature_name;
 use atomesh_flow::{Barrier, Boundary, Condition, Control, Value, Well};
 
 use crate::failure::Failure;

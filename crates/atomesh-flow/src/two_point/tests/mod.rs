@@ -5,8 +5,8 @@ mod exact;
 mod wells;
 
 use atomesh::geometry::{Bounds, Point, lexicographic};
-use atomesh::mesh::Delaunay;
-use atomesh::voronoi::{PolyMesh, voronoi};
+use atomesh::mesh::{Delaunay, PolyMesh};
+use atomesh::voronoi::voronoi;
 use atomesh::watch::Silent;
 use rand::{RngExt, SeedableRng};
 use rand_pcg::Pcg64;
@@ -81,7 +81,7 @@ fn all_sides<'a, const D: usize>(
     pressure: &'a (dyn Fn(&Point<D>) -> f64 + Sync),
 ) -> Vec<Boundary<'a, D>> {
     let condition = Condition::Pressure(Value::Field(pressure));
-    let side = |n| Boundary { group: atomesh::voronoi::side_name(n).to_string(), condition };
+    let side = |n| Boundary { group: atomesh::mesh::side_name(n).to_string(), condition };
     (0..2 * D).map(side).collect()
 }
 

@@ -4,7 +4,7 @@ use std::fmt::Write as _;
 use std::io::{self, Write};
 use std::path::{Path, PathBuf};
 
-use atomesh::voronoi::{boundary_connections, connections, side_name};
+use atomesh::mesh::{boundary_connections, connections, side_name};
 use atomesh::watch::{Phase, Watch, check};
 use serde_json::json;
 
@@ -125,7 +125,7 @@ fn cells<const D: usize>(list: &List<D>) -> String {
     let mut text = format!("cell,{},volume,{}{more}\n", vector::<D>("site"), vector::<D>("center"));
     for cell in 0..mesh.cell_count() {
         let _ = write!(text, "{cell}");
-        put(&mut text, &mesh.sites()[cell]);
+        put(&mut text, &mesh.centers()[cell]);
         put(&mut text, &[mesh.measures()[cell]]);
         put(&mut text, &mesh.centroids()[cell]);
         put(&mut text, list.flow.map_or(&[], |flow| &flow.permeability[cell..=cell]));

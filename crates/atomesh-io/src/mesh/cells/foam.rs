@@ -1,6 +1,6 @@
 //! Polygons and polyhedra as OpenFOAM's polyMesh.
 
-use atomesh::voronoi::side_name;
+use atomesh::mesh::side_name;
 
 use super::super::polymesh::{Beyond, FaceZone, Patch, PolyMesh, PolyMeshError};
 use super::CellData;

@@ -15,8 +15,9 @@ pub use modflow::{ModflowFiles, Rock, write_modflow};
 pub(in crate::mesh) use read::RawCells;
 pub use read::{AnyCells, CellReadError, LoadedCells, read_cells};
 
+use atomesh::features::FeatureFaces;
 use atomesh::image::Frame;
-use atomesh::voronoi::{FeatureFaces, PolyMesh};
+use atomesh::mesh::PolyMesh;
 
 use super::Provenance;
 

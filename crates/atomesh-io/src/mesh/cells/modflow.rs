@@ -11,7 +11,7 @@ use std::fmt::Write as _;
 use std::io::Write;
 use std::path::{Path, PathBuf};
 
-use atomesh::voronoi::{Connection, PolyMesh, connections};
+use atomesh::mesh::{Connection, PolyMesh, connections};
 use atomesh::watch::{Phase, Watch, check};
 
 use super::super::MeshWriteError;
@@ -131,7 +131,7 @@ fn disv<const D: usize>(mesh: &PolyMesh<D>, rock: &Rock) -> String {
     }
     block(&mut text, "VERTICES", &lines);
     lines.clear();
-    for (cell, site) in mesh.sites().iter().enumerate() {
+    for (cell, site) in mesh.centers().iter().enumerate() {
         let around = clockwise(mesh, cell);
         let _ = write!(lines, "  {} {:?} {:?} {}", cell + 1, site[0], site[1], around.len());
         for corner in around {
@@ -187,8 +187,8 @@ fn disu<const D: usize>(mesh: &PolyMesh<D>, faces: &[Connection<D>]) -> String {
     block(&mut text, "DIMENSIONS", &format!("  NODES {cells}\n  NJA {}\n", ja.len()));
     let mut lines = String::new();
     let height = |site: &[f64; D], by: f64| site[D - 1] + by;
-    array(&mut lines, "TOP", &mesh.sites().iter().map(|s| height(s, 0.5)).collect::<Vec<_>>());
-    array(&mut lines, "BOT", &mesh.sites().iter().map(|s| height(s, -0.5)).collect::<Vec<_>>());
+    array(&mut lines, "TOP", &mesh.centers().iter().map(|s| height(s, 0.5)).collect::<Vec<_>>());
+    array(&mut lines, "BOT", &mesh.centers().iter().map(|s| height(s, -0.5)).collect::<Vec<_>>());
     array(&mut lines, "AREA", mesh.measures());
     block(&mut text, "GRIDDATA", &lines);
     lines.clear();

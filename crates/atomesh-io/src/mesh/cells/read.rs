@@ -9,10 +9,11 @@ use std::collections::BTreeMap;
 use std::io;
 use std::path::Path;
 
+use atomesh::features::FeatureFaces;
 use atomesh::geometry::{Bounds, Point};
 use atomesh::image::{Frame, Units};
-use atomesh::mesh::Delaunay;
-use atomesh::voronoi::{FeatureFaces, PolyMesh, VoronoiError, voronoi};
+use atomesh::mesh::{Delaunay, PolyMesh};
+use atomesh::voronoi::{VoronoiError, voronoi};
 use atomesh::watch::{Cancelled, Watch};
 
 use super::super::data::{OwnedField, Provenance};

@@ -2,7 +2,7 @@
 
 use std::io::{Seek, Write};
 
-use atomesh::voronoi::PolyMesh;
+use atomesh::mesh::PolyMesh;
 use atomesh::watch::Watch;
 
 use super::super::cell_fields::CellFields;
@@ -16,7 +16,7 @@ const POLYGON: u8 = 7;
 const POLYHEDRON: u8 = 42;
 
 /// Writes polygons or polyhedra as a VTU file, which ParaView and meshio read, with the arrays `volume` (in 2-D
-/// the area) and `site`, one value a cell. Polygons have them as cell data; polyhedra as field data, since
+/// the area) and `site` (`center` where cells have no sites), one value a cell. Polygons have them as cell data; polyhedra as field data, since
 /// meshio 5 sorts polyhedra by their number of points, but cell data another way, and then refuses them.
 ///
 /// # Errors
@@ -42,26 +42,27 @@ pub fn write_cells_vtu_with<const D: usize>(
 ) -> Result<(), MeshWriteError> {
     let (text, mesh) = (data.metadata(), data.mesh);
     let topology = Topology::of(mesh);
-    let sites = padded(mesh.sites());
+    let centers = padded(mesh.centers());
+    let center_name = if mesh.sites().is_some() { "site" } else { "center" };
     let points = padded(mesh.points());
     let mut head = Head::new("UnstructuredGrid");
     head.text("<FieldData>\n");
     head.field_data("UInt8", metadata::NAME, Column::slice(text.as_bytes(), Endian::Little));
     let (count, cells) = (mesh.points().len(), mesh.cell_count());
     let vectors = "NumberOfComponents=\"3\"";
-    let (volume, site) =
-        (Column::slice(mesh.measures(), Endian::Little), Column::slice(&sites, Endian::Little));
+    let (volume, center) =
+        (Column::slice(mesh.measures(), Endian::Little), Column::slice(&centers, Endian::Little));
     let piece = format!("<Piece NumberOfPoints=\"{count}\" NumberOfCells=\"{cells}\">\n");
     if D == 2 {
         head.text(&format!("</FieldData>\n{piece}<CellData>\n"));
         head.array("Float64", "volume", "", volume);
-        head.array("Float64", "site", vectors, site);
+        head.array("Float64", center_name, vectors, center);
         head.cell_fields(fields.numbers(), fields.vectors());
         head.text("</CellData>\n<Points>\n");
     } else {
         let tuples = format!("NumberOfTuples=\"{cells}\"");
         head.array("Float64", "volume", &tuples, volume);
-        head.array("Float64", "site", &format!("{vectors} {tuples}"), site);
+        head.array("Float64", center_name, &format!("{vectors} {tuples}"), center);
         head.text(&format!("</FieldData>\n{piece}"));
         if !fields.is_empty() {
             head.cell_data(fields.numbers(), fields.vectors(), None);

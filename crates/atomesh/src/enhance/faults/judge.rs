@@ -6,7 +6,7 @@
 //! torn apart by a sample or more. At a disk's rim the throw is 0 and nothing can be seen.
 
 use super::{FaultOptions, faults};
-use crate::enhance::crest::Crest;
+use crate::crests::FeaturePoint;
 use crate::geometry::{Point, dot};
 use crate::synth::{Geometry, Scene, SynthOptions, Synthetic, Truth, synthesize};
 use crate::watch::Silent;
@@ -66,8 +66,8 @@ pub(super) fn score<const D: usize>(
 }
 
 /// The score of crests.
-pub(super) fn judge<const D: usize>(crests: &[Crest<D>], truth: &Truth<D>) -> Score {
-    let right = |c: &&Crest<D>| truth.distance(&c.point.map(f64::from)) <= NEAR;
+pub(super) fn judge<const D: usize>(crests: &[FeaturePoint<D>], truth: &Truth<D>) -> Score {
+    let right = |c: &&FeaturePoint<D>| truth.distance(&c.position) <= NEAR;
     let precision = crests.iter().filter(right).count() as f64 / crests.len().max(1) as f64;
     let bins = Bins::new(crests, truth.grid.shape);
     let (mut all, mut thrown) = ((0, 0), (0, 0));
@@ -139,15 +139,15 @@ fn tangents<const D: usize>(normal: &Point<D>) -> Vec<Point<D>> {
 /// Crests by cells twice as wide as near is.
 struct Bins<'a, const D: usize> {
     counts: [usize; D],
-    cells: Vec<Vec<&'a Crest<D>>>,
+    cells: Vec<Vec<&'a FeaturePoint<D>>>,
 }
 
 impl<'a, const D: usize> Bins<'a, D> {
-    fn new(crests: &'a [Crest<D>], shape: [usize; D]) -> Self {
+    fn new(crests: &'a [FeaturePoint<D>], shape: [usize; D]) -> Self {
         let counts = shape.map(|n| n / 4 + 2);
         let mut bins = Self { counts, cells: vec![Vec::new(); counts.iter().product()] };
         for crest in crests {
-            let cell = bins.cell(&crest.point.map(|x| (f64::from(x).max(0.0) / 4.0) as usize));
+            let cell = bins.cell(&crest.position.map(|x| (x.max(0.0) / 4.0) as usize));
             bins.cells[cell].push(crest);
         }
         bins
@@ -165,7 +165,7 @@ impl<'a, const D: usize> Bins<'a, D> {
                 ((p[k] + side).max(0.0) / 4.0) as usize
             });
             self.cells[self.cell(&at)].iter().any(|crest| {
-                let squared = |k: usize| (f64::from(crest.point[k]) - p[k]).powi(2);
+                let squared = |k: usize| (crest.position[k] - p[k]).powi(2);
                 (0..D).map(squared).sum::<f64>() <= NEAR * NEAR
             })
         })

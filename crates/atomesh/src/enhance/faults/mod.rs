@@ -39,8 +39,8 @@ mod judge;
 #[cfg(test)]
 mod tests;
 
-use super::crest::{Crest, connected};
 use super::{EnhanceError, LONGEST, MOST_EXTENT, within};
+use crate::crests::{FeaturePoint, Hysteresis, linked};
 use crate::image::Grid;
 use crate::watch::{Phase, Watch, check};
 use facing::Facing;
@@ -126,7 +126,7 @@ pub(crate) fn faults<const D: usize>(
     grid: &Grid<D>,
     options: &FaultOptions,
     watch: &mut dyn Watch,
-) -> Result<Vec<Crest<D>>, EnhanceError> {
+) -> Result<Vec<FeaturePoint<D>>, EnhanceError> {
     options.check()?;
     check(watch, Phase::Potential, 0.0, None)?;
     let Some(scale) = sides::Scale::of(values) else { return Ok(Vec::new()) };
@@ -146,7 +146,15 @@ pub(crate) fn faults<const D: usize>(
     let crests = thin::thin(found, grid, options);
     check(watch, Phase::Potential, 0.95, None)?;
     let least = options.least_length.powi(D as i32 - 1) as usize;
-    let kept = connected(crests, grid.shape, options.low as f32, options.high as f32, least);
+    let kept = linked(
+        crests,
+        grid.shape,
+        Hysteresis {
+            low: f64::from(options.low as f32),
+            high: f64::from(options.high as f32),
+            least_count: least,
+        },
+    );
     check(watch, Phase::Potential, 1.0, None)?;
     Ok(kept)
 }

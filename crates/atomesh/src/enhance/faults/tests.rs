@@ -40,7 +40,7 @@ fn unit<const D: usize>(shape: [usize; D]) -> Grid<D> {
     Grid { shape, step: [1.0; D] }
 }
 
-fn found<const D: usize>(values: &[f32], shape: [usize; D]) -> Vec<Crest<D>> {
+fn found<const D: usize>(values: &[f32], shape: [usize; D]) -> Vec<FeaturePoint<D>> {
     faults(values, &unit(shape), &FaultOptions::default(), &mut Silent).unwrap()
 }
 
@@ -111,13 +111,13 @@ fn plane_is_found<const D: usize>(shape: [usize; D], normal: [f64; D]) {
     };
     let age = |p: [f64; D]| p[D - 1] - 0.1 * p[0] + if distance(p) > 0.0 { 4.0 } else { 0.0 };
     let crests = found(&layers(shape, age), shape);
-    let inner = |p: &[f32; D]| (0..D).all(|k| (10.0..shape[k] as f32 - 11.0).contains(&p[k]));
+    let inner = |p: &[f64; D]| (0..D).all(|k| (10.0..shape[k] as f64 - 11.0).contains(&p[k]));
     let (mut count, mut off) = (0, 0.0);
-    for crest in crests.iter().filter(|c| inner(&c.point)) {
-        let error = distance(crest.point.map(f64::from));
+    for crest in crests.iter().filter(|c| inner(&c.position)) {
+        let error = distance(crest.position);
         // the two samples at a jump are alike to within half a sample, and windows may tilt
-        assert!(error.abs() < 1.0, "{error} at {:?} of {normal:?}", crest.point);
-        let cosine: f64 = (0..D).map(|k| f64::from(crest.normal[k]) * normal[k] / norm).sum();
+        assert!(error.abs() < 1.0, "{error} at {:?} of {normal:?}", crest.position);
+        let cosine: f64 = (0..D).map(|k| crest.normal[k] * normal[k] / norm).sum();
         // half a step of dip and of strike is 4°, as much again as windows end at the border
         assert!(cosine.abs() > 10f64.to_radians().cos(), "{:?} for {normal:?}", crest.normal);
         count += 1;
@@ -129,7 +129,7 @@ fn plane_is_found<const D: usize>(shape: [usize; D], normal: [f64; D]) {
         let rest = coordinates(row * shape[0], shape);
         p[1..].copy_from_slice(&rest[1..].iter().map(|&i| i as f64).collect::<Vec<_>>());
         p[0] = -distance(p) * norm / normal[0];
-        inner(&p.map(|x| x as f32))
+        inner(&p)
     });
     let rows = rows.count();
     assert!(rows > 30 && count as f64 > 0.97 * rows as f64, "{count} of {rows} for {normal:?}");
@@ -198,9 +198,11 @@ fn amplitudes_count_by_their_ratios() {
 }
 
 /// The share of crests of `a` with one of `b` so near, in samples.
-fn alike<const D: usize>(a: &[Crest<D>], b: &[Crest<D>], near: f32) -> f64 {
-    let close = |c: &&Crest<D>| {
-        let squared = |o: &Crest<D>| (0..D).map(|k| (c.point[k] - o.point[k]).powi(2)).sum::<f32>();
+fn alike<const D: usize>(a: &[FeaturePoint<D>], b: &[FeaturePoint<D>], near: f64) -> f64 {
+    let close = |c: &&FeaturePoint<D>| {
+        let squared = |o: &FeaturePoint<D>| {
+            (0..D).map(|k| (c.position[k] - o.position[k]).powi(2)).sum::<f64>()
+        };
         b.iter().any(|o| squared(o) < near * near)
     };
     a.iter().filter(close).count() as f64 / a.len().max(1) as f64
@@ -214,7 +216,7 @@ fn mirrored_layers_have_mirrored_faults() {
     let mirrored: Vec<f32> = values.chunks(128).flat_map(|row| row.iter().rev().copied()).collect();
     let mut back = found(&mirrored, shape);
     for crest in &mut back {
-        crest.point[0] = 127.0 - crest.point[0];
+        crest.position[0] = 127.0 - crest.position[0];
         crest.normal[0] = -crest.normal[0];
     }
     // only ties and roundings know left from right; a weak end may be in one and not in the other
@@ -228,9 +230,9 @@ fn axes_of_a_volume_are_alike() {
     let age = |p: [f64; 3]| p[2] + if p[0] + 0.3 * p[1] + 0.2 * p[2] > 33.2 { 3.0 } else { 0.0 };
     let crests = found(&layers(shape, age), shape);
     let turned = found(&layers([44, 40, 48], |p| age([p[1], p[0], p[2]])), [44, 40, 48]);
-    let turned: Vec<Crest<3>> = turned
+    let turned: Vec<FeaturePoint<3>> = turned
         .into_iter()
-        .map(|c| Crest { point: [c.point[1], c.point[0], c.point[2]], ..c })
+        .map(|c| FeaturePoint { position: [c.position[1], c.position[0], c.position[2]], ..c })
         .collect();
     assert!(crests.len() > 1000);
     assert!(alike(&crests, &turned, 0.02) > 0.99 && alike(&turned, &crests, 0.02) > 0.99);
@@ -247,7 +249,7 @@ fn spacing_turns_normals_and_nothing_else() {
     let spaced = faults(&values, &grid, &FaultOptions::default(), &mut Silent).unwrap();
     assert_eq!(plain.len(), spaced.len());
     for (a, b) in plain.iter().zip(&spaced) {
-        assert_eq!((a.index, a.point, a.strength), (b.index, b.point, b.strength));
+        assert_eq!((a.index, a.position, a.strength), (b.index, b.position, b.strength));
         // what lies on the fault in samples lies on it in lattice units
         let along = [-a.normal[1] * 25.0, a.normal[0] * 4.0];
         let across = along[0] * b.normal[0] + along[1] * b.normal[1];
@@ -341,8 +343,8 @@ proptest! {
             let options = FaultOptions { low: 0.0, high: 0.0, least_length: 0.0, ..Default::default() };
             for crest in faults(&values, &unit(shape), &options, &mut Silent).unwrap() {
                 let sample = coordinates(crest.index, shape);
-                assert!((0..D).all(|k| (crest.point[k] - sample[k] as f32).abs() <= 0.5));
-                let norm: f32 = crest.normal.iter().map(|n| n * n).sum();
+                assert!((0..D).all(|k| (crest.position[k] - sample[k] as f64).abs() <= 0.5));
+                let norm: f64 = crest.normal.iter().map(|n| n * n).sum();
                 assert!((norm - 1.0).abs() < 1e-5 && (0.0..=1.0).contains(&crest.strength));
             }
         }

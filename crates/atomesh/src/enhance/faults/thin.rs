@@ -4,7 +4,7 @@ use super::FaultOptions;
 use super::background::Background;
 use super::facing::volume;
 use super::scan::{Found, Orientation};
-use crate::enhance::crest::Crest;
+use crate::crests::FeaturePoint;
 use crate::image::Grid;
 use rayon::prelude::*;
 
@@ -19,7 +19,7 @@ pub(super) fn thin<const D: usize>(
     mut found: Found,
     grid: &Grid<D>,
     options: &FaultOptions,
-) -> Vec<Crest<D>> {
+) -> Vec<FeaturePoint<D>> {
     let [nx, ny, _] = volume(grid.shape);
     let background = Background::new(&found.missing, grid.shape);
     let share = options.background as f32;
@@ -49,10 +49,15 @@ pub(super) fn thin<const D: usize>(
             }
             let mut place = sample.map(|i| i as f32);
             place[axis] += vertex(before, here, after);
-            let mut point = [0.0; D];
-            point[..D - 1].copy_from_slice(&place[..D - 1]);
-            point[D - 1] = place[2];
-            Some(Crest { index, point, normal: normal(orientation, grid), strength: here })
+            let mut position = [0.0; D];
+            position[..D - 1].copy_from_slice(&place[..D - 1]);
+            position[D - 1] = place[2];
+            Some(FeaturePoint {
+                index,
+                position: position.map(f64::from),
+                normal: normal(orientation, grid).map(f64::from),
+                strength: here.into(),
+            })
         })
     });
     crests.collect()

@@ -4,7 +4,7 @@
 //! makes max(1, d/6) in all. Valleys pull alike, whatever their depth; which are deep enough is measured
 //! against the deepest tenth of them, since smoothing thin features took most of their depth.
 
-use crate::crests::{Bottom, Search, bottoms, in_large_groups};
+use crate::crests::{FeaturePoint, ValleySearch, bottoms, in_large_groups, strongest};
 use crate::fields::Fields;
 use crate::fields::ScalarField;
 use crate::geometry::Point;
@@ -46,7 +46,7 @@ pub(super) fn guides(
     let grid = potential.grid();
     let step = grid.step.iter().product::<f64>().sqrt();
     let bounds = grid.bounds();
-    let guide = |bottom: &Bottom<2>| {
+    let guide = |bottom: &FeaturePoint<2>| {
         let scaled = std::array::from_fn(|k| bottom.position[k] * grid.step[k]);
         let position = bounds.clamp(&scaled);
         // a normal is a slope: per lattice unit it is less where steps are long
@@ -71,19 +71,11 @@ fn deep_valleys(
     potential: &ScalarField<2>,
     size: f64,
     watch: &mut dyn Watch,
-) -> Result<Vec<Bottom<2>>, Cancelled> {
+) -> Result<Vec<FeaturePoint<2>>, Cancelled> {
     let variance = ((size / 6.0).powi(2) - 1.0).max(LEAST_VARIANCE);
-    let search =
-        Search { sigma: [variance.sqrt(); 2], least_depth: LEAST_DEPTH, phase: Phase::Improve };
+    let sigma = [variance.sqrt(); 2];
+    let search = ValleySearch { sigma, least_depth: LEAST_DEPTH, phase: Phase::Improve };
     let shape = potential.grid().shape;
-    let mut found = bottoms(potential.samples(), shape, &search, watch)?;
-    if found.is_empty() {
-        return Ok(found);
-    }
-    let mut depths: Vec<f32> = found.iter().map(|bottom| bottom.depth).collect();
-    let place = depths.len() * 9 / 10;
-    let (_, deepest, _) = depths.select_nth_unstable_by(place, f32::total_cmp);
-    let least = DEPTH_SHARE * *deepest;
-    found.retain(|bottom| bottom.depth > least);
-    Ok(in_large_groups(found, shape, 4.0 * size))
+    let found = strongest(bottoms(potential.samples(), shape, &search, watch)?, DEPTH_SHARE);
+    Ok(in_large_groups(found, shape, size))
 }

@@ -14,16 +14,16 @@ const BLOCK: usize = 2048;
 /// Pieces of the cells for each thread, so that threads end at about the same time.
 const PIECES_A_THREAD: usize = 4;
 
-/// Where cells of `N` corners are found.
-pub(super) trait Cells<const N: usize>: Sync {
-    /// The number of places; some may be empty.
+/// A list of cells of `N` corners, with gaps.
+pub(super) trait CellSource<const N: usize>: Sync {
+    /// The number of places in the list; some may be empty.
     fn place_count(&self) -> usize;
 
     /// The corners of the cell at a place, as ranks in the prepared order.
     fn corners(&self, place: usize) -> Option<[u32; N]>;
 }
 
-impl<const N: usize> Cells<N> for Vec<[u32; N]> {
+impl<const N: usize> CellSource<N> for Vec<[u32; N]> {
     fn place_count(&self) -> usize {
         self.len()
     }
@@ -37,7 +37,7 @@ impl<const N: usize> Cells<N> for Vec<[u32; N]> {
 ///
 /// Within a cell corners ascend but for the last two, which are swapped if the orientation needs it;
 /// cells are in lexicographic order. Cost: O(n) for cells spread over the points.
-pub(super) fn arrange<const N: usize>(sources: &[impl Cells<N>], order: &[u32]) -> Vec<u32> {
+pub(super) fn arrange<const N: usize>(sources: &[impl CellSource<N>], order: &[u32]) -> Vec<u32> {
     let pieces = pieces(sources);
     let cells = |(source, places): &(usize, Range<usize>)| {
         let source = &sources[*source];
@@ -73,21 +73,21 @@ pub(super) fn arrange<const N: usize>(sources: &[impl Cells<N>], order: &[u32]) 
     arranged
 }
 
-/// Which block a cell goes to.
+/// The block of a cell: that of its lowest corner.
 #[inline]
 fn block_of<const N: usize>(corners: &[u32; N]) -> usize {
     corners.iter().fold(u32::MAX, |least, &corner| least.min(corner)) as usize / BLOCK
 }
 
-/// Divides the places of each source.
-fn pieces<const N: usize>(sources: &[impl Cells<N>]) -> Vec<(usize, Range<usize>)> {
-    let place_count: usize = sources.iter().map(Cells::place_count).sum();
+/// Divides the places of each source into ranges of about one length.
+fn pieces<const N: usize>(sources: &[impl CellSource<N>]) -> Vec<(usize, Range<usize>)> {
+    let place_count: usize = sources.iter().map(CellSource::place_count).sum();
     let length = place_count.div_ceil(PIECES_A_THREAD * rayon::current_num_threads()).max(1);
-    let of_source = |(source, cells): (usize, _)| {
-        let end = Cells::place_count(cells);
+    let of_source = |source: usize| {
+        let end = sources[source].place_count();
         (0..end).step_by(length).map(move |start| (source, start..end.min(start + length)))
     };
-    sources.iter().enumerate().flat_map(of_source).collect()
+    (0..sources.len()).flat_map(of_source).collect()
 }
 
 /// Sorts cells of which the lowest corners are in one block, from `first` on, and gives all corners
@@ -128,7 +128,7 @@ fn sort_evenly<const N: usize>(cell: &mut [u32; N]) {
     let mut odd = false;
     for end in (1..N).rev() {
         for k in 0..end {
-            // Without a branch: which corner is lower is anyone's guess.
+            // Without a branch: which corner is lower cannot be predicted.
             let (a, b) = (cell[k], cell[k + 1]);
             (cell[k], cell[k + 1]) = (a.min(b), a.max(b));
             odd ^= a > b;

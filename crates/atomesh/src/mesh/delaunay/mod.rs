@@ -38,7 +38,7 @@ pub enum ConnectError {
         /// The corners of one cell.
         least: usize,
     },
-    /// More points than indices of 32 bits can serve.
+    /// More points than indices of 32 bits can number.
     #[error("{count} points are too many; expected at most {most}")]
     TooMany {
         /// How many there are.
@@ -95,7 +95,7 @@ pub enum ConnectError {
     Mesh(#[from] MeshError),
 }
 
-/// The most points that can be connected: the cells' facets are numbered by 32 bits.
+/// Most points that can be connected: the cells' facets are numbered by 32 bits.
 pub(crate) const MOST_POINTS: usize = 1 << 27;
 
 /// Points inserted between two looks at the watch: some 10 ms.
@@ -174,7 +174,7 @@ impl<const D: usize> Delaunay<D> {
         Ok(Mesh::new(points.par_iter().copied().collect(), corners)?)
     }
 
-    /// The mesh of points and cells that are known to be those of [`Self::connect`], in the order of its own.
+    /// The mesh of points and cells that are known to be those of [`Self::connect`], with cells and corners in its order.
     pub(crate) fn arrange(
         &self,
         points: Vec<Point<D>>,

@@ -29,8 +29,8 @@ impl<const D: usize> Prepared<D> {
         let scaled = scale(points)?;
         let order = hilbert_order(&scaled);
         let points: Vec<Point<D>> = order.par_iter().map(|&i| scaled[i as usize]).collect();
-        let twins = points.par_windows(2).position_first(|pair| equal(&pair[0], &pair[1]));
-        if let Some(at) = twins {
+        let equal_pair = points.par_windows(2).position_first(|pair| equal(&pair[0], &pair[1]));
+        if let Some(at) = equal_pair {
             let pair = [order[at] as usize, order[at + 1] as usize];
             return Err(ConnectError::Duplicate { first: pair[0], second: pair[1] });
         }

@@ -1,9 +1,9 @@
 //! The order of insertion: rounds of growing density, each along the Hilbert curve.
 
-/// Of so many points that follow each other, one belongs to a coarser round.
+/// Points that follow each other of which one belongs to a coarser round.
 const RATIO: usize = 8;
 
-/// A round of this size is not divided.
+/// Size of a round that is not divided further.
 const LEAST: usize = 64;
 
 /// The ranks below `count` in order of insertion; ranks follow a Hilbert curve.

@@ -1,9 +1,8 @@
 //! Triangles, by the crate `spade`.
 //!
-//! Points are inserted one by one, as in 3-D, rather than by its bulk loading, which no watch could
-//! end; each is looked for from the one before, so the order makes up for it. Where four points or more lie
-//! on one circle with no point inside, their cells follow from the order of insertion; [`ties`] makes them
-//! follow from the points alone.
+//! Points are inserted one by one, as in 3-D, since a watch could not end `spade`'s bulk loading. Each is located from
+//! the one before, so that the order along a curve keeps this fast. Where four points or more lie on one circle with no
+//! point inside, their cells depend on the order of insertion; [`ties`] makes them depend only on the points.
 
 mod ties;
 

@@ -1,13 +1,13 @@
 //! One triangulation where circles pass through four points or more.
 //!
-//! Cells that share a circumcircle make up a convex polygon. It is cut anew, from its lexicographically least
+//! Cells that share a circumcircle make up a convex polygon. It is triangulated again, from its lexicographically least
 //! point to all others: the same cells whatever made the polygon, and whatever points are elsewhere.
 
 use std::collections::{HashMap, HashSet};
 
 use crate::geometry::{Point, lexicographic};
 
-/// Cuts the polygons of cells that are linked by `pairs` anew. Cells are positive, by their corners.
+/// Triangulates the polygons of cells that are linked by `pairs` again. Cells are positive, by their corners.
 pub(super) fn settle(cells: &mut [[u32; 3]], pairs: &[[u32; 2]], points: &[Point<2>]) {
     let mut links: Vec<[u32; 2]> = pairs.iter().flat_map(|&[a, b]| [[a, b], [b, a]]).collect();
     links.sort_unstable();

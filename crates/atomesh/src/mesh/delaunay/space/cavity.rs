@@ -10,7 +10,7 @@ impl Triangulation {
     /// Finds all cells in conflict with `p`, from the one that holds it, and the facets around them.
     ///
     /// Works from the cells of one step to all their neighbours at once. Whether a cell is in conflict
-    /// is anyone's guess: without a branch on it the processor works on many at a time.
+    /// cannot be predicted: without a branch on it the processor works on many at a time.
     pub(super) fn dig(&mut self, p: &Point<3>, holder: u32) {
         debug_assert!(self.conflicts(&self.tetrahedra.cells[holder as usize], p));
         self.cavity.clear();
@@ -19,7 +19,7 @@ impl Triangulation {
         let mut start = 0;
         while start < self.cavity.len() {
             let end = self.cavity.len();
-            self.ask_neighbours(start..end, p);
+            self.test_neighbours(start..end, p);
             start = end;
         }
         self.surround();
@@ -27,26 +27,26 @@ impl Triangulation {
 
     /// Adds to the cavity the neighbours of some of its cells that are in conflict with `p`.
     #[inline]
-    fn ask_neighbours(&mut self, steps: Range<usize>, p: &Point<3>) {
+    fn test_neighbours(&mut self, steps: Range<usize>, p: &Point<3>) {
         let Tetrahedra { cells, marks, .. } = &mut self.tetrahedra;
-        self.asked.resize(self.asked.len().max(4 * steps.len()), (0, 0.0));
+        self.candidates.resize(self.candidates.len().max(4 * steps.len()), (0, 0.0));
         let mut count = 0;
         for &cell in &self.cavity[steps] {
             for facet in cells[cell as usize].neighbours {
                 let mark = &mut marks[(facet >> 2) as usize];
-                self.asked[count].0 = facet >> 2;
+                self.candidates[count].0 = facet >> 2;
                 count += usize::from(*mark == Mark::Unseen);
-                *mark = if *mark == Mark::Unseen { Mark::Asked } else { *mark };
+                *mark = if *mark == Mark::Unseen { Mark::Pending } else { *mark };
             }
         }
-        for (cell, rounded) in &mut self.asked[..count] {
+        for (cell, rounded) in &mut self.candidates[..count] {
             let corners = cells[*cell as usize].corners;
             *rounded = rounded_in_sphere(corners.map(|v| &self.vertices[v as usize].at), p);
         }
         let mut end = self.cavity.len();
         self.cavity.resize(end + count, 0);
         for at in 0..count {
-            let (cell, rounded) = self.asked[at];
+            let (cell, rounded) = self.candidates[at];
             let here = &self.tetrahedra.cells[cell as usize];
             let conflict = match self.predicates.in_sphere_if_clear(rounded) {
                 Some(inside) if !here.is_infinite() => inside,

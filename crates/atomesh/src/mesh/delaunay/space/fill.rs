@@ -43,7 +43,7 @@ impl Rim {
     #[inline]
     fn place(&mut self, vertices: &mut [Vertex], vertex: u32) -> u32 {
         let label = &mut vertices[vertex as usize].label;
-        // A label is a note that may be stale: the list tells.
+        // A label may be stale: the list decides.
         if self.vertices.get(*label as usize) != Some(&vertex) {
             *label = self.vertices.len() as u32;
             self.vertices.push(vertex);

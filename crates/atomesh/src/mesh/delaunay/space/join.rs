@@ -73,7 +73,7 @@ impl Triangulation {
         for &cell in &other.cavity {
             for vertex in other.tetrahedra.cells[cell as usize].corners {
                 let label = &mut other.vertices[vertex as usize].label;
-                // A label is a note that may be stale: the list tells.
+                // A label may be stale: the list decides.
                 if vertex != INFINITE && seam.get(*label as usize) != Some(&vertex) {
                     *label = seam.len() as u32;
                     seam.push(vertex);

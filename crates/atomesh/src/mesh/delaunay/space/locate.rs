@@ -5,8 +5,8 @@ use super::storage::FACETS;
 use crate::geometry::Point;
 
 impl Triangulation {
-    /// The finite cell that holds the point, no vertex, or an infinite cell whose facet sees it from
-    /// outside.
+    /// The finite cell that holds the point, which is not a vertex, or an infinite cell on whose side of the hull it
+    /// lies.
     ///
     /// Steps through any facet that has the point strictly beyond it. In a Delaunay triangulation
     /// no cell is met twice (Edelsbrunner 1990), so the walk ends.

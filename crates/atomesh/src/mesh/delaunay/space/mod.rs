@@ -4,7 +4,7 @@
 //! 2. Points come in rounds, each about eight times the one before, along a Hilbert curve within a
 //!    round: a biased randomized insertion order (Amenta, Choi & Rote 2003).
 //! 3. A walk from the last cell made finds the cell that holds the point ([`locate`]).
-//! 4. Cells whose circumsphere holds the point are removed; they are connected ([`cavity`]).
+//! 4. Cells whose circumsphere holds the point are removed; they make a connected cavity ([`cavity`]).
 //! 5. New cells join the point to the facets around the hole ([`fill`]).
 //! 6. Cells near other parts are found ([`seam`]), and their vertices inserted into the first part,
 //!    so that final cells of all parts make up the whole ([`join`]).
@@ -43,13 +43,13 @@ use predicates::Predicates;
 use rayon::prelude::*;
 use storage::{Mark, Tetrahedra, Vertex};
 
-/// A part has at least so many points: the seams of smaller ones would be most of them.
+/// Least number of points in a part: smaller parts would be mostly seam.
 const LEAST_PART: usize = 4096;
 
-/// More parts than this gain nothing: their seams are connected by one thread.
+/// Most parts. More gain nothing, since one thread connects their seams.
 const MOST_PARTS: usize = 16;
 
-/// The share of the work that parts can do alone, about.
+/// The approximate share of the work that parts do alone.
 const GROWTH: f64 = 0.9;
 
 /// See [`super::Connector`].
@@ -61,7 +61,7 @@ pub(super) fn connect(
     connect_in_parts(prepared, rayon::current_num_threads().min(most), watch)
 }
 
-/// Connects points divided into so many parts, at most.
+/// Connects points divided into at most `part_count` parts.
 pub(super) fn connect_in_parts(
     prepared: &Prepared<3>,
     part_count: usize,
@@ -80,7 +80,7 @@ pub(super) fn connect_in_parts(
     }
 }
 
-/// Inserts the points one by one in the given order: the slow twin of insertion by parts.
+/// Inserts the points one by one in the given order: the reference for insertion by parts.
 #[cfg(test)]
 pub(super) fn connect_in_order(
     points: &[crate::geometry::Point<3>],
@@ -103,7 +103,7 @@ fn connect_parts(
     part::grow(&mut parts, share, watch)?;
     let triangulations = join::join(parts, share, watch)?;
     let corners = canonical::arrange(&triangulations, order);
-    // Memory is given back in parallel too.
+    // Memory is freed in parallel too.
     triangulations.into_par_iter().for_each(drop);
     Ok(corners)
 }
@@ -118,15 +118,15 @@ struct Triangulation {
     hint: u32,
     /// Cells in conflict with the point being inserted.
     cavity: Vec<u32>,
-    /// Cells that may be, and their rounded in-sphere determinants.
-    asked: Vec<(u32, f64)>,
-    /// The facets around them, as seen from the cells that stay.
+    /// Cells to be tested for conflict with it, and their rounded in-sphere determinants.
+    candidates: Vec<(u32, f64)>,
+    /// The facets around the cavity, as seen from the cells that stay.
     boundary: Vec<u32>,
     rim: Rim,
 }
 
 impl Triangulation {
-    /// Of four vertices that span a positive cell.
+    /// The triangulation of four vertices that span a positive cell.
     fn new(vertices: Vec<Vertex>, first: [u32; 4], predicates: Predicates) -> Self {
         let tetrahedra = start::first_cells(first, vertices.len());
         Self {
@@ -135,7 +135,7 @@ impl Triangulation {
             predicates,
             hint: 0,
             cavity: Vec::new(),
-            asked: Vec::new(),
+            candidates: Vec::new(),
             boundary: Vec::new(),
             rim: Rim::default(),
         }
@@ -149,7 +149,7 @@ impl Triangulation {
     }
 }
 
-impl canonical::Cells<4> for Triangulation {
+impl canonical::CellSource<4> for Triangulation {
     fn place_count(&self) -> usize {
         self.tetrahedra.cells.len()
     }

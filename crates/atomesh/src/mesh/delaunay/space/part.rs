@@ -42,7 +42,7 @@ impl Part {
         Some(Self { triangulation, bounds, order, inserted: 4 })
     }
 
-    /// Inserts the next points, so many at most, and tells how many.
+    /// Inserts at most `most` of the next points; returns how many.
     pub fn insert(&mut self, most: usize) -> usize {
         let end = self.order.len().min(self.inserted + most);
         let next = &self.order[self.inserted..end];

@@ -3,10 +3,10 @@
 use crate::geometry::{Bounds, Point};
 use rayon::prelude::*;
 
-/// A plane's place is the median of about so many points.
+/// A plane is put at the median of about this many points.
 const SAMPLE: usize = 1 << 14;
 
-/// The ranks of the points in so many parts of about equal counts; fewer where no plane divides the
+/// The ranks of the points in `part_count` parts of about equal counts; fewer if no plane divides the
 /// points.
 ///
 /// The boxes of the parts do not meet. Each part keeps the order of the ranks.
@@ -29,8 +29,8 @@ pub(super) fn split(points: &[Point<3>], ranks: Vec<u32>, part_count: usize) -> 
     }
 }
 
-/// Divides by a plane across the longest side of their box, a share below; `None` if no plane across
-/// this side leaves points on both sides.
+/// Divides points by a plane across the longest side of their box, the given share below it; `None` if no
+/// such plane leaves points on both sides.
 fn divide(points: &[Point<3>], ranks: &[u32], share: f64) -> Option<(Vec<u32>, Vec<u32>)> {
     let at = |rank: &u32| &points[*rank as usize];
     let extent = bounds(points, ranks)?.extent();
@@ -39,7 +39,7 @@ fn divide(points: &[Point<3>], ranks: &[u32], share: f64) -> Option<(Vec<u32>, V
     let mut sample: Vec<f64> = ranks.iter().step_by(stride).map(|rank| at(rank)[axis]).collect();
     let place = ((share * sample.len() as f64) as usize).min(sample.len() - 1);
     let plane = *sample.select_nth_unstable_by(place, f64::total_cmp).1;
-    // A layer of a crystal may lie on the plane: it goes where it leaves the parts more alike.
+    // A layer of a crystal may lie on the plane: it goes to the side that makes the counts more equal.
     let count = |is_low: fn(f64, f64) -> bool| {
         ranks.iter().filter(|rank| is_low(at(rank)[axis], plane)).count()
     };

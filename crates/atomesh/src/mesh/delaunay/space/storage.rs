@@ -1,4 +1,4 @@
-//! Cells and vertices in flat arrays; a freed cell's place is used again.
+//! Cells and vertices in flat arrays; the places of freed cells are reused.
 //!
 //! A facet is named by its cell and the corner opposite to it: `4 · cell + corner`. A cell keeps, for
 //! each corner, the facet of the neighbour that is this facet seen from the other side.
@@ -15,19 +15,19 @@ pub(super) const FACETS: [[usize; 3]; 4] = [[1, 3, 2], [0, 2, 3], [0, 3, 1], [0,
 /// What is known of a cell while a point is inserted.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(super) enum Mark {
-    /// Not looked at.
+    /// Not met.
     Unseen,
-    /// To be looked at.
-    Asked,
+    /// To be tested.
+    Pending,
     /// In conflict with the point.
     Conflict,
-    /// Looked at and not in conflict.
+    /// Tested, and not in conflict.
     Kept,
     /// Not a cell: its place is free.
     Free,
 }
 
-/// A point, its rank in the prepared order, and a place for a passing note.
+/// A point, its rank in the prepared order, and a label for temporary use.
 #[derive(Clone, Copy, Debug)]
 #[repr(align(32))]
 pub(super) struct Vertex {

@@ -2,21 +2,43 @@
 
 use rayon::prelude::*;
 
-use super::mean_distance;
-use super::poly_mesh::{PolyMesh, side_name};
+use super::{PolyMesh, PolyParts, mean_distance};
 use crate::geometry::{Bounds, Point, difference, dot};
+use crate::mesh::side_name;
 
 /// Cells that one task looks at.
 const BLOCK: usize = 1 << 10;
 
 /// How far a corner may be off the plane of its face, or beyond that of another face of its cell, over the mean
-/// distance of sites.
+/// distance of cells.
 const PLANAR: f64 = 1e-9;
 
 /// The first promise that a mesh breaks.
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]
 #[non_exhaustive]
 pub enum PolyFault {
+    /// The counts of the parts disagree.
+    #[error("{found} {what}; expected {expected}")]
+    Count {
+        /// What is counted.
+        what: &'static str,
+        /// How many there are.
+        found: usize,
+        /// How many the other parts ask for.
+        expected: usize,
+    },
+    /// A face names a point or a cell that does not exist.
+    #[error("face {face} names {what} {found}; there are {count}")]
+    Missing {
+        /// The face's index.
+        face: usize,
+        /// "point" or "cell".
+        what: &'static str,
+        /// What it names.
+        found: u32,
+        /// How many there are.
+        count: usize,
+    },
     /// A cell has no inside.
     #[error("cell {cell} has the measure {measure:e}; expected it positive")]
     Measure {
@@ -83,6 +105,44 @@ pub enum PolyFault {
     },
 }
 
+/// Checks that parts fit each other, so that a mesh can be made of them.
+pub(super) fn check_parts<const D: usize>(
+    parts: &PolyParts<D>,
+    cell_count: usize,
+) -> Result<(), PolyFault> {
+    let face_count = parts.owners.len();
+    let on_sides: usize = parts.side_counts[..2 * D].iter().sum();
+    let last = parts.ends.last().copied().unwrap_or(0);
+    let counts = [
+        ("ends of faces", parts.ends.len(), face_count),
+        ("faces inside and on sides", parts.neighbours.len() + on_sides, face_count),
+        ("corners", parts.corners.len(), last),
+    ];
+    if let Some(&(what, found, expected)) = counts.iter().find(|(_, found, wanted)| found != wanted)
+    {
+        return Err(PolyFault::Count { what, found, expected });
+    }
+    let mut start = 0;
+    for (face, &end) in parts.ends.iter().enumerate() {
+        let corners = parts.corners.get(start..end).unwrap_or(&[]);
+        if corners.len() < D {
+            return Err(PolyFault::Corners { face, corners: corners.to_vec(), least: D });
+        }
+        let cells = [Some(parts.owners[face]), parts.neighbours.get(face).copied()];
+        let named = [
+            ("point", corners.iter().max().copied(), parts.points.len()),
+            ("cell", cells.into_iter().flatten().max(), cell_count),
+        ];
+        for (what, greatest, count) in named {
+            if let Some(found) = greatest.filter(|&found| found as usize >= count) {
+                return Err(PolyFault::Missing { face, what, found, count });
+            }
+        }
+        start = end;
+    }
+    Ok(())
+}
+
 impl<const D: usize> PolyMesh<D> {
     /// Checks that every cell has measure.
     pub(super) fn check_cells(&self) -> Result<(), PolyFault> {
@@ -93,10 +153,10 @@ impl<const D: usize> PolyMesh<D> {
         }
     }
 
-    /// Checks that every cell has measure, is closed and convex and holds its site; that every face has D or
-    /// more points, all different and, to 10⁻⁹ of the mean distance of sites, on one plane; that faces on the
-    /// sides of `bounds`, the box in the mesh's own coordinates, are exactly on them; and that the measures sum
-    /// to the box's to 10⁻¹². Cost: O(points of faces · faces of a cell).
+    /// Checks that every cell has measure, is closed and convex and holds its site, if it has one; that every face
+    /// has D or more points, all different and, to 10⁻⁹ of the mean distance of cells, on one plane; that faces on
+    /// the sides of `bounds`, the box in the mesh's own coordinates, are exactly on them; and that the measures sum to
+    /// the box's to 10⁻¹². Cost: O(points of faces · faces of a cell).
     ///
     /// # Errors
     /// The first fault, in this order of cells.
@@ -157,8 +217,8 @@ impl<const D: usize> PolyMesh<D> {
                     return Some(PolyFault::Convex { cell, face, point, off, limit });
                 }
             }
-            let off = plane.above(&self.sites()[cell]);
-            if off > limit {
+            let site = self.sites().map(|sites| &sites[cell]);
+            if let Some(off) = site.map(|site| plane.above(site)).filter(|off| *off > limit) {
                 return Some(PolyFault::Site { cell, face, off });
             }
         }
@@ -185,8 +245,8 @@ impl<const D: usize> PolyMesh<D> {
                 .all(|edge| matches!(edge, [a, b] if a.2 != b.2))
     }
 
-    /// The plane of a face, its normal out of the cell; of a face too thin to have one, that between the two
-    /// sites.
+    /// The plane of a face, its normal out of the cell; for a face too thin to have one, the plane at right angles to
+    /// the line between the two cells' centres.
     fn plane(&self, cell: usize, face: usize, sign: f64, limit: f64) -> Option<Plane<D>> {
         let vector = self.area_vector(face);
         let area = dot(&vector, &vector).sqrt();
@@ -200,7 +260,7 @@ impl<const D: usize> PolyMesh<D> {
         }
         let owner = self.owners()[face] as usize;
         let other = if owner == cell { *self.neighbours().get(face)? as usize } else { owner };
-        let (from, to) = (&self.sites()[cell], &self.sites()[other]);
+        let (from, to) = (&self.centers()[cell], &self.centers()[other]);
         let axis = difference(to, from);
         let length = dot(&axis, &axis).sqrt();
         Some(Plane { through: first, normal: axis.map(|x| x / length) })

@@ -1,10 +1,10 @@
-//! Which faces lie on features of the image.
+//! The faces of polygons and polyhedra that lie on features of the image.
 
 use rayon::prelude::*;
 
-use super::poly_mesh::PolyMesh;
 use crate::fields::ScalarField;
 use crate::geometry::{Point, Sets, difference, dot};
+use crate::mesh::{PolyMesh, area_vector};
 
 /// Faces that one task looks at.
 const BLOCK: usize = 1 << 10;
@@ -20,14 +20,15 @@ pub struct FeatureFaces {
     pub areas: Vec<f64>,
 }
 
-/// A face lies along a feature if |b| falls to this share of its mean on the way to the two sites beside it.
+/// A face lies along a feature if, halfway to the centres of the two cells, the mean of |b| falls to this share.
 const FALL: f64 = 0.9;
 
-/// Finds the faces inside the box on which |b| is `least` or more in the mean, and which lie along a feature, not
-/// across it: on the face moved to either of its sites |b| is less in the mean; and those of as much |b| that
-/// close a gap between such. Grouped by shared edges (2-D: points). |b|, since b is negated where atoms are to line up alongside features and faces to fall on them.
-/// Groups smaller than `least_area` are left out. The mesh is in lattice coordinates. The mean is taken at points
-/// at most a sample apart.
+/// Finds the faces inside the box that lie along features, in groups that share edges (2-D: points).
+///
+/// The mean of |b| over such a face is `least` or more, and it falls where the face is moved toward its two cells'
+/// centres: a face across a feature is none. Faces of as much |b| that close a gap between others are added. |b| counts
+/// because b is negated where faces, rather than atoms, are to lie on features. Groups smaller than `least_area` are
+/// left out. The mesh is in lattice coordinates. Means are taken at points at most a sample apart.
 pub fn feature_faces<const D: usize>(
     mesh: &PolyMesh<D>,
     potential: &ScalarField<D>,
@@ -45,15 +46,7 @@ pub fn feature_faces<const D: usize>(
     let is_strong = |face: usize| f64::from(strengths[face]) >= least;
     close_gaps(mesh, &mut along, is_strong);
     let chosen: Vec<usize> = (0..along.len()).filter(|&face| along[face]).collect();
-    let mut ridges: Vec<(u32, u32, u32)> = Vec::new();
-    for (index, &face) in chosen.iter().enumerate() {
-        ridges.extend(ridges_of(mesh, face).map(|(a, b)| (a, b, index as u32)));
-    }
-    ridges.sort_unstable();
-    let mut sets = Sets::new(chosen.len());
-    for ridge in ridges.chunk_by(|a, b| (a.0, a.1) == (b.0, b.1)) {
-        ridge.windows(2).for_each(|pair| sets.join(pair[0].2, pair[1].2));
-    }
+    let mut sets = connected(mesh, &chosen);
     let mut area_of = vec![0.0; chosen.len()];
     for (index, &face) in chosen.iter().enumerate() {
         let vector = mesh.area_vector(face);
@@ -73,6 +66,21 @@ pub fn feature_faces<const D: usize>(
     FeatureFaces { of_faces, strengths, areas }
 }
 
+/// The chosen faces in sets that share edges, each by its place among them.
+fn connected<const D: usize>(mesh: &PolyMesh<D>, chosen: &[usize]) -> Sets {
+    // an edge of a chosen face by its ends, and the face's place among the chosen
+    let mut ridges: Vec<(u32, u32, u32)> = Vec::new();
+    for (index, &face) in chosen.iter().enumerate() {
+        ridges.extend(ridges_of(mesh, face).map(|(a, b)| (a, b, index as u32)));
+    }
+    ridges.sort_unstable();
+    let mut sets = Sets::new(chosen.len());
+    for ridge in ridges.chunk_by(|a, b| (a.0, a.1) == (b.0, b.1)) {
+        ridge.windows(2).for_each(|pair| sets.join(pair[0].2, pair[1].2));
+    }
+    sets
+}
+
 /// The edges of a face by their ends, the lesser first (2-D: its two points, each twice).
 fn ridges_of<const D: usize>(
     mesh: &PolyMesh<D>,
@@ -86,8 +94,8 @@ fn ridges_of<const D: usize>(
     })
 }
 
-/// Chooses strong faces too half of whose edges, two at least (2-D: both ends), are those of chosen ones. A face across
-/// a feature has but one there.
+/// Also chooses strong faces of which half the edges, at least two (2-D: both ends), are edges of chosen faces. A face
+/// across a feature has only one there.
 fn close_gaps<const D: usize>(
     mesh: &PolyMesh<D>,
     chosen: &mut [bool],
@@ -107,7 +115,7 @@ fn close_gaps<const D: usize>(
     }
 }
 
-/// Whether |b| falls from the face to both sides.
+/// Whether |b| falls from the face toward the two cells.
 fn is_along<const D: usize>(
     mesh: &PolyMesh<D>,
     potential: &ScalarField<D>,
@@ -116,24 +124,24 @@ fn is_along<const D: usize>(
     step: f64,
 ) -> bool {
     let [owner, neighbour] =
-        [mesh.owners()[face], mesh.neighbours()[face]].map(|cell| mesh.sites()[cell as usize]);
+        [mesh.owners()[face], mesh.neighbours()[face]].map(|cell| mesh.centers()[cell as usize]);
     let half = difference(&neighbour, &owner).map(|x| 0.5 * x);
-    let moved = |way: Point<D>| self::strength(mesh, potential, face, way, step);
+    let moved = |shift: Point<D>| self::strength(mesh, potential, face, shift, step);
     0.5 * (moved(half) + moved(half.map(|x| -x))) <= FALL * strength
 }
 
-/// The mean of |b| over a face that is moved by a vector; values outside the image are those at its border.
+/// The mean of |b| over a face that is moved by `shift`; values outside the image are those at its border.
 fn strength<const D: usize>(
     mesh: &PolyMesh<D>,
     potential: &ScalarField<D>,
     face: usize,
-    way: Point<D>,
+    shift: Point<D>,
     step: f64,
 ) -> f64 {
     let (mut sum, mut total) = (0.0, 0.0);
-    for mut simplex in mesh.simplices(face) {
-        simplex.iter_mut().flatten().zip(way.iter().cycle()).for_each(|(x, w)| *x += w);
-        let part = super::poly_mesh::area_vector(&simplex);
+    for mut simplex in mesh.face_simplices(face) {
+        simplex.iter_mut().flatten().zip(shift.iter().cycle()).for_each(|(x, w)| *x += w);
+        let part = area_vector(&simplex);
         let area = dot(&part, &part).sqrt();
         sum += area * mean(potential, &simplex, step);
         total += area;

@@ -1,15 +1,15 @@
 //! Better places on an outline for the points of its facets, and better fitting facets.
 //!
-//! A trimmed mesh has its outline's points where atoms and crossings happened to be. Point by point, those
-//! on the outline slide along it and those beside it move freely, each to the place, of a few tried, at which
-//! the worst of its cells is best. Then the outline's points step out by what facets between points of a
-//! curved surface lack, so that the mesh has the mask's measure. Cost: O(points at the outline).
+//! A trimmed mesh has its outline's points where atoms and crossings happened to be. Point by point, those on the
+//! outline slide along it and those beside it move freely: of a few places tried, each takes the one at which its
+//! worst cell is best. Facets between points of a curved surface cut off its bulges, so the outline's points then step
+//! out by as much, and the mesh has the mask's measure. Cost: O(points at the outline).
 
 use crate::geometry::{Point, Simplex, difference, distance_squared, dot};
-use crate::mesh::{CellsOfPoints, Mesh};
+use crate::mesh::{CellsOfPoints, Mesh, area_vector};
 use crate::watch::{Phase, Watch, check};
 
-use super::carve::regularity;
+use super::regularity::regularity;
 use super::{Outline, RegionError, Trimmed};
 
 /// Rounds over all points beside the outline.
@@ -18,9 +18,9 @@ const SWEEPS: usize = 4;
 const GOOD: f64 = 0.7;
 /// Lengths of the steps tried, over the mean length of a point's edges.
 const STEPS: [f64; 2] = [0.2, 0.06];
-/// The worst cell must gain as much for a point to move.
+/// Least gain in the regularity of a point's worst cell for the point to move.
 const GAIN: f64 = 1e-3;
-/// A point may be put onto the outline, or stepped out, as long as its cells keep this regularity.
+/// Least regularity of the cells of a point that is put onto the outline or stepped out, if they had as much before.
 const FLOOR: f64 = 0.15;
 
 /// The points and cells of a trimmed mesh while points move.
@@ -63,7 +63,7 @@ impl<'a, const D: usize> Moving<'a, D> {
         worst
     }
 
-    /// The mean of the points joined to one, each as often as cells have it, and their mean distance.
+    /// The mean of the points joined to one, and their mean distance, both weighted by the cells that share the edge.
     fn neighbourhood(&self, point: usize) -> (Point<D>, f64) {
         let (mut mean, mut length, mut count) = ([0.0; D], 0.0, 0.0);
         for &cell in self.cells_of(point) {
@@ -129,7 +129,7 @@ impl<'a, const D: usize> Moving<'a, D> {
         }
     }
 
-    /// The points that the outline's cells have.
+    /// The points of all cells with a point on the outline.
     fn beside(&self) -> Vec<usize> {
         let mut near = vec![false; self.points.len()];
         for cell in self.corners.chunks_exact(D + 1) {
@@ -156,7 +156,7 @@ fn directions<const D: usize>() -> impl Iterator<Item = Point<D>> {
 ///
 /// # Errors
 /// [`RegionError::Cancelled`].
-pub fn smooth<const D: usize>(
+pub fn smooth_outline<const D: usize>(
     trimmed: Trimmed<D>,
     outline: &Outline<D>,
     watch: &mut dyn Watch,
@@ -184,23 +184,27 @@ pub fn smooth<const D: usize>(
     Ok(Trimmed { mesh: Mesh::new(points, corners)?, ..trimmed })
 }
 
-/// Steps the outline's points out, or in, by what its facets lack on the average: D/(D + 1) of what they lack
-/// at their centroids, the mean over a facet of a parabola that passes through its corners.
+/// Steps the outline's points out, or in, by the mean distance of the outline from the facets beside them. Over a facet
+/// it is D/(D + 1) of the distance at the centroid, as that of a parabola through the corners is.
 ///
 /// # Errors
 /// [`RegionError::Mesh`].
-pub fn fit<const D: usize>(
+pub fn fit_facets<const D: usize>(
     trimmed: Trimmed<D>,
     outline: &Outline<D>,
 ) -> Result<Trimmed<D>, RegionError> {
     let mut moving = Moving::new(&trimmed, outline);
     let mut sums = vec![(0.0, 0.0); moving.points.len()];
     for facet in &trimmed.facets {
-        let (centroid, normal) = facet_plane(&facet.map(|c| moving.points[c as usize]));
+        let corners = facet.map(|c| moving.points[c as usize]);
+        let centroid: Point<D> =
+            std::array::from_fn(|k| corners.iter().map(|p| p[k]).sum::<f64>() / D as f64);
+        let normal = area_vector(&corners);
         let measure = dot(&normal, &normal).sqrt();
-        let reach = measure.powf(1.0 / (D as f64 - 1.0));
+        // the edge, or the side of a square as large as two such triangles
+        let length = ((D - 1) as f64 * measure).powf(1.0 / (D as f64 - 1.0));
         let all = ((1 << D) - 1) as u8;
-        if let Some(q) = outline.project(&centroid, all, 0.5 * reach) {
+        if let Some(q) = outline.project(&centroid, all, 0.5 * length) {
             let lack = dot(&difference(&q, &centroid), &normal) / measure;
             for &c in facet {
                 let (sum, weight) = &mut sums[c as usize];
@@ -224,20 +228,4 @@ pub fn fit<const D: usize>(
     }
     let Moving { points, corners, .. } = moving;
     Ok(Trimmed { mesh: Mesh::new(points, corners)?, ..trimmed })
-}
-
-/// The centroid of a facet, and its normal, as long as the facet's measure times (D − 1)!, outward for a facet
-/// of [`Trimmed::facets`].
-fn facet_plane<const D: usize>(corners: &[Point<D>; D]) -> (Point<D>, Point<D>) {
-    let centroid = std::array::from_fn(|k| corners.iter().map(|p| p[k]).sum::<f64>() / D as f64);
-    let edges: Vec<Point<D>> = corners[1..].iter().map(|p| difference(p, &corners[0])).collect();
-    let normal = std::array::from_fn(|k| {
-        if D == 2 {
-            if k == 0 { edges[0][1] } else { -edges[0][0] }
-        } else {
-            let (i, j) = ((k + 1) % D, (k + 2) % D);
-            edges[0][i] * edges[D - 2][j] - edges[0][j] * edges[D - 2][i]
-        }
-    });
-    (centroid, normal)
 }

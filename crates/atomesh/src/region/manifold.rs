@@ -1,42 +1,45 @@
-//! Mending the boundary of a part of a mesh until it is a manifold.
+//! Dropping cells of a part of a mesh until its boundary is a manifold.
 //!
-//! A boundary is pinched where more than two of its facets meet in a ridge (a point in 2-D, an edge in 3-D)
-//! or, in 3-D, where its facets around a point make more than one fan. Of the cells around a pinch all but
-//! the largest group that hangs together by facets is dropped, cells whose corners are all on the outline
-//! first; a gap between two outsides that meet in a point is opened. Each round only drops cells, so that the
-//! rounds end.
+//! A boundary is pinched where more than two of its facets meet in a ridge (a point in 2-D, an edge in 3-D), or, in
+//! 3-D, where its facets around a point make more than one fan. Of the cells around a pinch only the largest group
+//! connected by facets stays. If there is but one group, a gap between two outsides that meet there is widened: the
+//! least cell is dropped, cells whose corners are all on the outline first. Each round only drops cells, so the rounds
+//! end.
 
 use std::collections::HashMap;
 
-use crate::geometry::{Simplex, distance_squared};
 use crate::mesh::{CellsOfPoints, Mesh};
+
+use super::regularity::regularity;
 
 /// No cell.
 const NONE: u32 = u32::MAX;
 
-/// Cells of less regularity (see [`regularity`]) whose corners are all on the outline are dropped where the
-/// boundary can do without.
+/// Cells of less [`regularity`] whose corners are all on the outline are dropped where the boundary stays of the same
+/// kind without them.
 const SLIVER: f64 = 0.25;
 
-/// How regular a cell is: its measure over that of the equilateral cell of the same root mean square edge,
-/// 1 at best, 0 if flat, negative if inverted (Parthasarathy, Graichen & Hathaway 1994).
-pub(super) fn regularity<const D: usize>(simplex: &Simplex<D>) -> f64 {
-    let mut squares = 0.0;
-    for (k, a) in simplex.others.iter().enumerate() {
-        squares += distance_squared(a, &simplex.first);
-        squares += simplex.others[k + 1..].iter().map(|b| distance_squared(a, b)).sum::<f64>();
+/// Which of the `kept` cells of a mesh stay so that their boundary is a manifold. Those that `peelable` names, whose
+/// corners are all on the outline, go first.
+pub(super) fn until_manifold<const D: usize>(
+    mesh: &Mesh<D>,
+    peelable: Vec<bool>,
+    kept: Vec<bool>,
+) -> Vec<bool> {
+    let mut part = Part::new(mesh, peelable, kept);
+    loop {
+        part.drop_slivers();
+        if !part.open_pinches() {
+            return part.kept;
+        }
     }
-    let edges = (D * (D + 1) / 2) as f64;
-    // the measure of the equilateral cell of edge 1: √3/4, 1/(6√2)
-    let unit = if D == 2 { 0.75f64.sqrt() / 2.0 } else { 0.5f64.sqrt() / 6.0 };
-    simplex.measure() / (unit * (squares / edges).powf(0.5 * D as f64))
 }
 
 /// A mesh of which some cells are kept.
-pub(super) struct Carving<'a, const D: usize> {
+struct Part<'a, const D: usize> {
     mesh: &'a Mesh<D>,
     /// Whether all corners of a cell are on the outline.
-    on: Vec<bool>,
+    peelable: Vec<bool>,
     kept: Vec<bool>,
     measures: Vec<f64>,
     /// The cell opposite each corner of each cell, or `NONE`.
@@ -44,8 +47,8 @@ pub(super) struct Carving<'a, const D: usize> {
     cells: CellsOfPoints,
 }
 
-impl<'a, const D: usize> Carving<'a, D> {
-    pub fn new(mesh: &'a Mesh<D>, on: Vec<bool>, kept: Vec<bool>) -> Self {
+impl<'a, const D: usize> Part<'a, D> {
+    fn new(mesh: &'a Mesh<D>, peelable: Vec<bool>, kept: Vec<bool>) -> Self {
         let mut neighbours = vec![NONE; mesh.corners().len()];
         for facet in mesh.facets() {
             let Some(other) = facet.neighbour else { continue };
@@ -58,22 +61,7 @@ impl<'a, const D: usize> Carving<'a, D> {
             }
         }
         let measures = mesh.simplices().map(|s| s.measure()).collect();
-        Self { mesh, on, kept, measures, neighbours, cells: mesh.cells_of_points() }
-    }
-
-    /// Which cells are kept.
-    pub fn kept(self) -> Vec<bool> {
-        self.kept
-    }
-
-    /// Drops flat cells of the boundary, and cells until it is a manifold.
-    pub fn mend(&mut self) {
-        loop {
-            self.peel();
-            if !self.open_pinches() {
-                break;
-            }
-        }
+        Self { mesh, peelable, kept, measures, neighbours, cells: mesh.cells_of_points() }
     }
 
     fn corners(&self, cell: u32) -> &'a [u32] {
@@ -81,7 +69,7 @@ impl<'a, const D: usize> Carving<'a, D> {
         &self.mesh.corners()[at..at + D + 1]
     }
 
-    /// Whether the facet of a kept cell opposite a corner is on the boundary.
+    /// Whether the facet of a kept cell opposite a corner is bare, that is, on the boundary.
     fn is_bare(&self, cell: u32, apex: usize) -> bool {
         let beyond = self.neighbours[cell as usize * (D + 1) + apex];
         beyond == NONE || !self.kept[beyond as usize]
@@ -98,57 +86,33 @@ impl<'a, const D: usize> Carving<'a, D> {
         facets
     }
 
-    /// Drops flat cells whose corners are all on the outline, where that changes the boundary's facets and
-    /// not its kind: what the cell shares with the boundary is just its bare facets.
-    fn peel(&mut self) {
-        let mut edges: HashMap<[u32; 2], u32> = HashMap::new();
-        let mut points: HashMap<u32, u32> = HashMap::new();
+    /// Drops flat cells whose corners are all on the outline, where that changes the boundary's facets but not its
+    /// kind: what the cell shares with the boundary is just its bare facets.
+    fn drop_slivers(&mut self) {
+        let mut around = FacetCounts::default();
         for facet in self.boundary() {
-            count(&facet, 1, &mut edges, &mut points);
+            around.add(&facet, 1);
         }
         for cell in 0..self.kept.len() as u32 {
             let i = cell as usize;
-            if !(self.kept[i] && self.on[i]) || self.quality(cell) >= SLIVER {
+            if !(self.kept[i] && self.peelable[i]) || self.quality(cell) >= SLIVER {
                 continue;
             }
             let corners = self.corners(cell);
             let bare: Vec<usize> = (0..=D).filter(|&a| self.is_bare(cell, a)).collect();
-            if bare.is_empty()
-                || bare.len() == D + 1
-                || !self.is_simple(corners, &bare, &edges, &points)
-            {
+            if bare.is_empty() || bare.len() == D + 1 || !around.only_bare::<D>(corners, &bare) {
                 continue;
             }
             self.kept[i] = false;
             for apex in 0..=D {
                 let facet = self.mesh.facet_of(i, apex);
-                count(&facet, if bare.contains(&apex) { -1 } else { 1 }, &mut edges, &mut points);
+                around.add(&facet, if bare.contains(&apex) { -1 } else { 1 });
             }
         }
     }
 
     fn quality(&self, cell: u32) -> f64 {
         regularity(&self.mesh.simplex(self.corners(cell)))
-    }
-
-    /// Whether every corner and edge of a cell that the boundary has belongs to a bare facet of the cell.
-    fn is_simple(
-        &self,
-        corners: &[u32],
-        bare: &[usize],
-        edges: &HashMap<[u32; 2], u32>,
-        points: &HashMap<u32, u32>,
-    ) -> bool {
-        // a corner is in the facet opposite any other
-        let covered = |set: &[usize]| bare.iter().any(|apex| !set.contains(apex));
-        let has = |n: Option<&u32>| n.is_some_and(|&n| n > 0);
-        (0..=D).all(|i| {
-            (covered(&[i]) || !has(points.get(&corners[i])))
-                && (D == 2
-                    || (i + 1..=D).all(|j| {
-                        covered(&[i, j]) || !has(edges.get(&ascending(corners[i], corners[j])))
-                    }))
-        })
     }
 
     /// Drops cells at pinches; says whether there were any.
@@ -166,25 +130,26 @@ impl<'a, const D: usize> Carving<'a, D> {
         let pinched: Vec<&[u32]> =
             ridges.chunk_by(|a, b| a == b).filter(|g| g.len() > 2).map(|g| &g[0][..]).collect();
         for ridge in &pinched {
-            self.thin_out(ridge);
+            self.open_pinch(ridge);
         }
         if !pinched.is_empty() || D == 2 {
             return !pinched.is_empty();
         }
         let points = pinched_points(&boundary);
         for &p in &points {
-            self.thin_out(&[p]);
+            self.open_pinch(&[p]);
         }
         !points.is_empty()
     }
 
-    /// Keeps the largest group of the kept cells around a face; if there is but one, drops its least cell.
-    fn thin_out(&mut self, face: &[u32]) {
+    /// Keeps only the largest group of the kept cells around a face, a ridge or point; if there is but one group, drops
+    /// its least cell.
+    fn open_pinch(&mut self, face: &[u32]) {
         let mut groups = self.groups(face);
         if groups.len() < 2 {
             let all = groups.concat();
             let order = |a: &u32, b: &u32| {
-                let key = |c: u32| (!self.on[c as usize], self.measures[c as usize]);
+                let key = |c: u32| (!self.peelable[c as usize], self.measures[c as usize]);
                 let (a, b) = (key(*a), key(*b));
                 a.0.cmp(&b.0).then(a.1.total_cmp(&b.1))
             };
@@ -194,7 +159,7 @@ impl<'a, const D: usize> Carving<'a, D> {
             return;
         }
         let weight = |group: &Vec<u32>| -> (bool, f64) {
-            let inside = group.iter().any(|&c| !self.on[c as usize]);
+            let inside = group.iter().any(|&c| !self.peelable[c as usize]);
             (inside, group.iter().map(|&c| self.measures[c as usize]).sum())
         };
         groups.sort_by(|a, b| {
@@ -206,7 +171,7 @@ impl<'a, const D: usize> Carving<'a, D> {
         }
     }
 
-    /// The kept cells around a face, in groups that hang together by facets that have the face.
+    /// The kept cells around a face, in groups connected by facets that have the face.
     fn groups(&self, face: &[u32]) -> Vec<Vec<u32>> {
         let around = self.cells.of(face[0]);
         let has = |cell: u32| face.iter().all(|f| self.corners(cell).contains(f));
@@ -239,20 +204,39 @@ fn ascending(a: u32, b: u32) -> [u32; 2] {
     [a.min(b), a.max(b)]
 }
 
-/// Counts a facet of the boundary at its edges and points.
-fn count<const D: usize>(
-    facet: &[u32; D],
-    change: i32,
-    edges: &mut HashMap<[u32; 2], u32>,
-    points: &mut HashMap<u32, u32>,
-) {
-    for (i, &a) in facet.iter().enumerate() {
-        let n = points.entry(a).or_default();
-        *n = n.wrapping_add_signed(change);
-        for &b in &facet[i + 1..] {
-            let n = edges.entry(ascending(a, b)).or_default();
+/// How many facets of the boundary have each edge and each point.
+#[derive(Default)]
+struct FacetCounts {
+    of_edges: HashMap<[u32; 2], u32>,
+    of_points: HashMap<u32, u32>,
+}
+
+impl FacetCounts {
+    /// Counts a facet in (`change` 1) or out (−1).
+    fn add<const D: usize>(&mut self, facet: &[u32; D], change: i32) {
+        for (i, &a) in facet.iter().enumerate() {
+            let n = self.of_points.entry(a).or_default();
             *n = n.wrapping_add_signed(change);
+            for &b in &facet[i + 1..] {
+                let n = self.of_edges.entry(ascending(a, b)).or_default();
+                *n = n.wrapping_add_signed(change);
+            }
         }
+    }
+
+    /// Whether all corners and edges of a cell that are on the boundary belong to its bare facets, those opposite the
+    /// corners `bare`.
+    fn only_bare<const D: usize>(&self, corners: &[u32], bare: &[usize]) -> bool {
+        // a corner is in the facet opposite any other
+        let covered = |set: &[usize]| bare.iter().any(|apex| !set.contains(apex));
+        let has_point = |i: usize| self.of_points.get(&corners[i]).is_some_and(|&n| n > 0);
+        let has_edge = |i: usize, j: usize| {
+            self.of_edges.get(&ascending(corners[i], corners[j])).is_some_and(|&n| n > 0)
+        };
+        (0..=D).all(|i| {
+            (covered(&[i]) || !has_point(i))
+                && (D == 2 || (i + 1..=D).all(|j| covered(&[i, j]) || !has_edge(i, j)))
+        })
     }
 }
 
@@ -288,24 +272,13 @@ fn pinched_points<const D: usize>(boundary: &[[u32; D]]) -> Vec<u32> {
 mod tests {
     use super::*;
 
-    #[test]
-    fn regularity_is_one_for_equilateral_cells() {
-        let h = 0.75f64.sqrt();
-        let flat = Simplex { first: [0.0, 0.0], others: [[1.0, 0.0], [0.5, h]] };
-        assert!((regularity(&flat) - 1.0).abs() < 1e-14);
-        let a = 0.5f64.sqrt();
-        let solid = Simplex { first: [0.0; 3], others: [[0.0, a, a], [a, 0.0, a], [a, a, 0.0]] };
-        assert!((regularity(&solid).abs() - 1.0).abs() < 1e-14);
-    }
-
     /// Two pairs of triangles that meet in the middle point of a square of four: a pinch.
     #[test]
     fn a_pinch_is_opened() {
         let points = vec![[0.0, 0.0], [2.0, 0.0], [2.0, 2.0], [0.0, 2.0], [1.0, 1.1]];
         let mesh = Mesh::new(points, vec![0, 1, 4, 1, 2, 4, 2, 3, 4, 3, 0, 4]).unwrap();
-        let mut carving = Carving::new(&mesh, vec![false; 4], vec![true, false, true, false]);
-        carving.mend();
+        let kept = until_manifold(&mesh, vec![false; 4], vec![true, false, true, false]);
         // the larger of the two stays
-        assert_eq!(carving.kept(), [true, false, false, false]);
+        assert_eq!(kept, [true, false, false, false]);
     }
 }

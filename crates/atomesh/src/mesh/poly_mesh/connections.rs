@@ -2,7 +2,7 @@
 
 use rayon::prelude::*;
 
-use super::poly_mesh::PolyMesh;
+use super::PolyMesh;
 use crate::geometry::{Point, difference, dot};
 
 /// Faces that one task looks at.
@@ -15,13 +15,13 @@ pub struct Connection<const D: usize> {
     pub cells: [u32; 2],
     /// The face's area (3-D) or length (2-D).
     pub area: f64,
-    /// From each cell's site to the face's plane.
+    /// From each cell's centre, [`PolyMesh::centers`], to the face's plane.
     pub distances: [f64; 2],
     /// The unit normal, from the first cell to the second.
     pub normal: Point<D>,
     /// The face's centroid.
     pub centroid: Point<D>,
-    /// The cosine of the angle between the normal and the line from site to site: 1 where flux between two
+    /// The cosine of the angle between the normal and the line from centre to centre: 1 where flux between two
     /// points is exact for isotropic permeability.
     pub orthogonality: f64,
 }
@@ -39,11 +39,11 @@ impl<const D: usize> Connection<D> {
 pub struct BoundaryConnection<const D: usize> {
     /// The cell.
     pub cell: u32,
-    /// The side's number: see [`super::side_name`].
+    /// The side's number: see [`side_name`](crate::mesh::side_name).
     pub side: usize,
     /// The face's area (3-D) or length (2-D).
     pub area: f64,
-    /// From the site to the side: 0 where the site lies on it.
+    /// From the cell's centre to the side: 0 where the centre lies on it.
     pub distance: f64,
     /// The unit normal, out of the box.
     pub normal: Point<D>,
@@ -51,20 +51,20 @@ pub struct BoundaryConnection<const D: usize> {
     pub centroid: Point<D>,
 }
 
-/// The faces between cells, in the mesh's order. All lengths are those of the mesh's coordinates.
+/// The faces between cells, in the mesh's order. Lengths are in the unit of the mesh's coordinates.
 pub fn connections<const D: usize>(mesh: &PolyMesh<D>) -> Vec<Connection<D>> {
     let connection = |face: usize| {
         let cells = [mesh.owners()[face], mesh.neighbours()[face]];
-        let sites = cells.map(|cell| &mesh.sites()[cell as usize]);
-        let axis = difference(sites[1], sites[0]);
+        let centers = cells.map(|cell| &mesh.centers()[cell as usize]);
+        let axis = difference(centers[1], centers[0]);
         let length = dot(&axis, &axis).sqrt();
         let centroid = mesh.face_centroid(face);
         let (area, mut normal) = unit(&mesh.area_vector(face));
         if !normal.iter().all(|x| x.is_finite()) {
             normal = axis.map(|x| x / length); // so thin that its own is lost to rounding
         }
-        let from = |site: &Point<D>| dot(&difference(&centroid, site), &normal);
-        let distances = [from(sites[0]), -from(sites[1])];
+        let from = |center: &Point<D>| dot(&difference(&centroid, center), &normal);
+        let distances = [from(centers[0]), -from(centers[1])];
         let orthogonality = dot(&normal, &axis) / length;
         Connection { cells, area, distances, normal, centroid, orthogonality }
     };
@@ -79,7 +79,7 @@ pub fn boundary_connections<const D: usize>(mesh: &PolyMesh<D>) -> Vec<BoundaryC
             let cell = mesh.owners()[face];
             let centroid = mesh.face_centroid(face);
             let (area, normal) = unit(&mesh.area_vector(face));
-            let distance = dot(&difference(&centroid, &mesh.sites()[cell as usize]), &normal);
+            let distance = dot(&difference(&centroid, &mesh.centers()[cell as usize]), &normal);
             BoundaryConnection { cell, side, area, distance: distance.max(0.0), normal, centroid }
         })
         .collect()

@@ -1,17 +1,16 @@
-//! Drawing short edges together, and numbering what is left.
+//! Merging the ends of short edges, and numbering points and faces.
 
 use rayon::prelude::*;
 
 use super::clip::{Cut, of_side, side_of};
-use super::dual::{NONE, Place};
-use super::poly_mesh::{Parts, PolyMesh};
-use super::validate::PolyFault;
+use super::dual::{Domain, NONE};
 use crate::geometry::{Point, Sets, distance_squared};
+use crate::mesh::{PolyFault, PolyMesh, PolyParts};
 
 /// Loops that one task looks at.
 const BLOCK: usize = 1 << 12;
 
-/// A face before it is numbered: its cells as in [`super::dual::Loops`], and where its corners are.
+/// A face before it is numbered: its cells, as in [`super::dual::Loops`], and the range of its corners.
 struct Face {
     cells: [u32; 2],
     start: usize,
@@ -33,39 +32,43 @@ impl Faces {
     }
 }
 
-pub(super) fn tidy<const D: usize>(
+/// The mesh of the complex within the box.
+///
+/// # Errors
+/// [`PolyFault`] if a cell is not closed or has no measure.
+pub(super) fn weld<const D: usize>(
     cut: Cut<D>,
     sites: &[Point<D>],
-    place: &Place<D>,
+    domain: &Domain<D>,
 ) -> Result<PolyMesh<D>, PolyFault> {
     let mut loops: Vec<(&[u32], [u32; 2])> = cut.inner.iter().collect();
     loops.extend(cut.rim.iter().map(|rim| (rim.corners.as_slice(), rim.cells)));
     let mut points = cut.points;
     let mut sides = cut.sides;
-    let vertex_of = draw_together(&mut points, &mut sides, &loops, place);
+    let vertex_of = merge_short_edges(&mut points, &mut sides, &loops, domain);
     let mut whole = Faces::default();
     let mut parts = Vec::new();
     for (corners, cells) in loops {
         parts.clear();
-        simple(corners.iter().map(|&c| vertex_of[c as usize]).collect(), &mut parts);
+        simple_loops(corners.iter().map(|&c| vertex_of[c as usize]).collect(), &mut parts);
         parts.iter().for_each(|corners| whole.push(corners, cells));
     }
-    let faces = if D == 2 { edges::<D>(&whole, &sides)? } else { whole };
+    let faces = if D == 2 { edges_of_polygons::<D>(&whole, &sides)? } else { whole };
     if let Some(face) = faces.faces.iter().find(|f| f.cells[0] as usize >= sites.len()) {
         return Err(PolyFault::Open { cell: face.cells[1] as usize });
     }
-    number(faces, &points, sites)
+    into_mesh(faces, &points, sites)
 }
 
-/// Makes the ends of edges shorter than the tolerance one point; says which point each one became. Of some
-/// points the one on most sides of the box stays, and is put on the sides of all.
-fn draw_together<const D: usize>(
+/// Merges the ends of edges shorter than the tolerance; returns the point that each point became. Of merged points the
+/// one on most sides of the box stays, and is put on the sides of all.
+fn merge_short_edges<const D: usize>(
     points: &mut [Point<D>],
     sides: &mut [u8],
     loops: &[(&[u32], [u32; 2])],
-    place: &Place<D>,
+    domain: &Domain<D>,
 ) -> Vec<u32> {
-    let limit = place.tolerance.powi(2);
+    let limit = domain.tolerance.powi(2);
     let short = |corners: &[u32]| -> Vec<[u32; 2]> {
         let edges = (0..corners.len()).map(|k| [corners[k], corners[(k + 1) % corners.len()]]);
         edges
@@ -108,8 +111,8 @@ fn draw_together<const D: usize>(
     vertex_of
 }
 
-/// The simple loops of three corners or more within a loop, as edges that run back along themselves cancel.
-fn simple(mut corners: Vec<u32>, found: &mut Vec<Vec<u32>>) {
+/// Appends the simple loops of three corners or more within a loop. Edges run through in both directions cancel.
+fn simple_loops(mut corners: Vec<u32>, found: &mut Vec<Vec<u32>>) {
     let mut kept: Vec<u32> = Vec::with_capacity(corners.len());
     for corner in corners.drain(..) {
         if kept.last() == Some(&corner) {
@@ -139,17 +142,17 @@ fn simple(mut corners: Vec<u32>, found: &mut Vec<Vec<u32>>) {
     }
     for (at, corner) in kept.iter().enumerate() {
         if let Some(gap) = kept[at + 1..].iter().position(|c| c == corner) {
-            simple(kept[at..=at + gap].to_vec(), found);
-            simple([&kept[..at], &kept[at + gap + 1..]].concat(), found);
+            simple_loops(kept[at..=at + gap].to_vec(), found);
+            simple_loops([&kept[..at], &kept[at + gap + 1..]].concat(), found);
             return;
         }
     }
     found.push(kept.to_vec());
 }
 
-/// The edges of polygons, as faces between them.
-fn edges<const D: usize>(polygons: &Faces, sides: &[u8]) -> Result<Faces, PolyFault> {
-    // ends ascending, then the cell, then whether the cell runs through it downward
+/// The edges of polygons (2-D), as faces between them.
+fn edges_of_polygons<const D: usize>(polygons: &Faces, sides: &[u8]) -> Result<Faces, PolyFault> {
+    // ends ascending, then the cell, then whether the cell's loop runs from the higher to the lower
     let mut all: Vec<(u32, u32, u32, bool)> = Vec::with_capacity(polygons.corners.len());
     for face in &polygons.faces {
         let corners = &polygons.corners[face.start..face.end];
@@ -176,9 +179,9 @@ fn edges<const D: usize>(polygons: &Faces, sides: &[u8]) -> Result<Faces, PolyFa
     Ok(faces)
 }
 
-/// Numbers points by their first face, and faces by their cells: those inside first, by owner and neighbour,
-/// then side after side.
-fn number<const D: usize>(
+/// The mesh of these faces. Points are numbered by their first face; faces inside come first, by owner and neighbour,
+/// then those of side after side.
+fn into_mesh<const D: usize>(
     faces: Faces,
     points: &[Point<D>],
     sites: &[Point<D>],
@@ -189,7 +192,7 @@ fn number<const D: usize>(
         None => (0, face.cells[0], face.cells[1]),
     };
     faces.par_sort_by_key(key);
-    let mut parts = Parts { sites: sites.to_vec(), ..Parts::default() };
+    let mut parts = PolyParts { sites: Some(sites.to_vec()), ..PolyParts::default() };
     let mut new_number = vec![NONE; points.len()];
     for face in &faces {
         for &corner in &corners[face.start..face.end] {
@@ -208,5 +211,5 @@ fn number<const D: usize>(
             None => return Err(PolyFault::Open { cell: face.cells[0] as usize }),
         }
     }
-    Ok(PolyMesh::new(parts))
+    PolyMesh::new(parts)
 }

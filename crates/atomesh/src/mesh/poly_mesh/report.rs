@@ -1,14 +1,13 @@
 //! The shape of polygons and polyhedra in numbers.
 
-use super::connections::connections;
-use super::poly_mesh::PolyMesh;
+use super::{PolyMesh, connections};
 use crate::geometry::{Bounds, distance_squared};
 
 /// Counts, sizes and shapes of cells. Lengths are in the unit of the mesh's coordinates.
 #[derive(Clone, Debug, PartialEq, serde::Serialize)]
 #[non_exhaustive]
 pub struct PolyReport {
-    /// Cells, one a site.
+    /// Cells.
     pub cells: usize,
     /// Points.
     pub points: usize,
@@ -32,7 +31,8 @@ pub struct PolyReport {
     pub edge_min: f64,
     /// Area of the smallest face (2-D: its length).
     pub face_min: f64,
-    /// Least cosine of the angle between a face's normal and the line from site to site: 1 in lattice space.
+    /// Least cosine of the angle between a face's normal and the line from centre to centre: 1 for Voronoi cells
+    /// in lattice space.
     pub orthogonality_min: f64,
 }
 

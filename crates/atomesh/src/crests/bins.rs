@@ -1,11 +1,12 @@
-//! Points by the part of the box that they are in.
+//! Points by the cube of the box that they are in, for asking which are near.
 
 use crate::geometry::{Bounds, Point};
 
 const NONE: u32 = u32::MAX;
 
 /// Cubes over a box, each with a list of points.
-pub(super) struct Bins<const D: usize> {
+#[derive(Debug)]
+pub(crate) struct Bins<const D: usize> {
     min: Point<D>,
     width: f64,
     shape: [usize; D],
@@ -16,8 +17,8 @@ pub(super) struct Bins<const D: usize> {
 impl<const D: usize> Bins<D> {
     /// Cubes of at least `width`, and not many more than `expected` points.
     pub fn new(bounds: &Bounds<D>, width: f64, expected: usize) -> Self {
-        let room = bounds.measure() / (expected.max(1) as f64);
-        let width = width.max(room.powf(1.0 / D as f64));
+        let each = bounds.measure() / (expected.max(1) as f64);
+        let width = width.max(each.powf(1.0 / D as f64));
         let shape = bounds.extent().map(|extent| (extent / width) as usize + 1);
         let heads = vec![NONE; shape.iter().product()];
         Self { min: bounds.min, width, shape, heads, next: Vec::new() }
@@ -36,7 +37,7 @@ impl<const D: usize> Bins<D> {
 
     /// Adds a point; its number is how many there were.
     pub fn push(&mut self, p: &Point<D>) {
-        let cube = self.flat(&self.cube(p));
+        let cube = self.index(&self.cube(p));
         self.next.push(std::mem::replace(&mut self.heads[cube], self.next.len() as u32));
     }
 
@@ -51,7 +52,7 @@ impl<const D: usize> Bins<D> {
                 rest /= counts[k];
                 low[k] + offset
             });
-            let mut at = self.heads[self.flat(&cube)];
+            let mut at = self.heads[self.index(&cube)];
             while at != NONE {
                 visit(at as usize);
                 at = self.next[at as usize];
@@ -66,7 +67,7 @@ impl<const D: usize> Bins<D> {
         })
     }
 
-    fn flat(&self, cube: &[usize; D]) -> usize {
-        (0..D).rev().fold(0, |flat, k| flat * self.shape[k] + cube[k])
+    fn index(&self, cube: &[usize; D]) -> usize {
+        (0..D).rev().fold(0, |index, k| index * self.shape[k] + cube[k])
     }
 }

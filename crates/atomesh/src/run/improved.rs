@@ -1,0 +1,101 @@
+//! The fifth stage: the mesh whose facets follow features.
+
+use rayon::prelude::*;
+
+use crate::image::{Frame, Samples};
+use crate::improve::ImproveReport;
+use crate::mesh::Mesh;
+use crate::mirror::MirrorReport;
+use crate::optimize::OptimizeReport;
+use crate::region::{join_islands, outline_facets};
+use crate::sample::{SampleOptions, Statistic, sample_placed};
+use crate::watch::Watch;
+
+use super::error::RunError;
+use super::outcome::Outcome;
+use super::prepared::{Parts, Prepared};
+
+/// The mesh as it stays: facets on features, no cell flat.
+#[derive(Clone, Debug)]
+pub struct Improved<const D: usize> {
+    pub(super) run: Prepared<D>,
+    pub(super) mesh: Mesh<D>,
+    pub(super) report: OptimizeReport,
+    pub(super) mirror_report: Option<MirrorReport>,
+    pub(super) improve_report: Option<ImproveReport>,
+}
+
+impl<const D: usize> Improved<D> {
+    /// What the run was prepared from.
+    pub fn run(&self) -> &Prepared<D> {
+        &self.run
+    }
+
+    /// The mesh in lattice coordinates.
+    pub fn mesh(&self) -> &Mesh<D> {
+        &self.mesh
+    }
+
+    /// What was improved; `None` if nothing was asked for.
+    pub fn improve_report(&self) -> Option<&ImproveReport> {
+        self.improve_report.as_ref()
+    }
+
+    /// Labels the cells and reads the fields at the points.
+    ///
+    /// # Errors
+    /// [`RunError::Sample`], also when cancelled.
+    pub fn finish(self, watch: &mut dyn Watch) -> Result<Outcome<D>, RunError> {
+        (self.run.parts().method.stages().finish)(self, watch)
+    }
+}
+
+/// [`Improved::finish`].
+pub(super) fn finish<const D: usize>(
+    improved: Improved<D>,
+    watch: &mut dyn Watch,
+) -> Result<Outcome<D>, RunError> {
+    let Improved { run, mesh, report, mirror_report, improve_report } = improved;
+    let Parts { potential, distance, outline, labels, .. } = run.parts();
+    let outline_facets = match outline {
+        Some(_) => outline_facets(&mesh, &run.bounds()),
+        None => Vec::new(),
+    };
+    let labels = labels.as_ref();
+    let labels = labels.map(|labels| label(&run, &mesh, labels, watch)).transpose()?;
+    let points = mesh.points().par_iter().with_min_len(1 << 10);
+    let distance_at_points = points.clone().map(|p| distance.at(p) as f32).collect();
+    let (low, high) = potential.range(); // a spline passes beyond it at jumps
+    let at = |p| (potential.value(p) as f32).clamp(low, high);
+    let potential_at_points = points.map(at).collect();
+    Ok(Outcome {
+        run,
+        mesh,
+        cells: None,
+        distance_at_points,
+        potential_at_points,
+        optimize_report: report,
+        improve_report,
+        mirror_report,
+        outline_facets,
+        labels,
+    })
+}
+
+/// The label of each cell.
+fn label<const D: usize>(
+    run: &Prepared<D>,
+    mesh: &Mesh<D>,
+    samples: &[i32],
+    watch: &mut dyn Watch,
+) -> Result<Vec<i32>, RunError> {
+    let Parts { options, grid, .. } = run.parts();
+    let frame = Frame::new(grid.shape).and_then(|f| f.with_spacing(grid.step));
+    let frame = frame.expect("a grid has samples and steps above 0");
+    let samples = Samples::I32(samples.to_vec());
+    let statistics = SampleOptions::new(&[Statistic::Majority]);
+    let found = sample_placed(mesh, &frame, &samples, statistics, watch)?;
+    let mut labels: Vec<i32> = found.values[0].iter().map(|&label| label as i32).collect();
+    join_islands(mesh, &mut labels, options.least_island);
+    Ok(labels)
+}

@@ -1,0 +1,176 @@
+//! From images and options to b(x), d(x) and β(x).
+
+use crate::enhance::{self, FeatureOptions, Features};
+use crate::fields::{
+    GRADIENT_LIMIT, Grading, ImageWeight, NominalDistance, ScalarField, default_distance,
+};
+use crate::image::{Frame, Grid, Image};
+use crate::region::{Outline, label_samples};
+use crate::watch::{Phase, Watch, check};
+
+use super::error::{RunError, Warning};
+use super::inputs::Inputs;
+use super::method::Method;
+use super::options::{MeshKind, MeshOptions, Size};
+use super::prepared::{Parts, Prepared};
+
+/// Makes b(x), d(x) and β(x).
+pub(super) fn prepare<const D: usize>(
+    method: &Method<D>,
+    inputs: Inputs<'_, D>,
+    options: MeshOptions<D>,
+    watch: &mut dyn Watch,
+) -> Result<Prepared<D>, RunError> {
+    let frame = *inputs.image.frame();
+    let grid = frame.grid(options.units);
+    options.optimize.validate()?;
+    options.improve.validate(D)?;
+    if let Some(axis) = (0..D).find(|&k| grid.shape[k] < 2) {
+        return Err(RunError::Thin { axis });
+    }
+    method.crystal(options.lattice)?; // refuse early what does not fit the dimension
+    let mut warnings = Vec::new();
+    let labels = match inputs.labels {
+        Some(labels) => {
+            same_shape("label image", &frame, labels)?;
+            Some(label_samples(labels.samples())?)
+        }
+        None => None,
+    };
+    let mut samples = potential_samples(&inputs, &options, &mut warnings, watch)?;
+    check(watch, Phase::Distance, 0.0, None)?;
+    let distance = nominal_distance(&inputs, &grid, &options, &samples)?;
+    let outline = outline(&inputs, grid, &distance, watch)?;
+    if let Some(outline) = &outline {
+        outline.combine(&mut samples);
+    }
+    let weight = weight(&inputs, grid, options.image_weight)?;
+    warnings.extend(coarse(&grid, &distance));
+    check(watch, Phase::Distance, 1.0, None)?;
+    let potential = ScalarField::new(grid, samples, options.interpolation)?;
+    let method = method.clone();
+    Ok(Prepared::new(Parts {
+        method,
+        options,
+        frame,
+        grid,
+        potential,
+        weight,
+        distance,
+        outline,
+        labels,
+        warnings,
+    }))
+}
+
+/// Where the mesh ends, if there is a mask and it does not hold the whole box.
+fn outline<const D: usize>(
+    inputs: &Inputs<'_, D>,
+    grid: Grid<D>,
+    distance: &NominalDistance<D>,
+    watch: &mut dyn Watch,
+) -> Result<Option<Outline<D>>, RunError> {
+    let Some(mask) = inputs.mask else { return Ok(None) };
+    same_shape("mask", inputs.image.frame(), mask)?;
+    Ok(Outline::new(mask, grid, distance, watch)?)
+}
+
+/// β(x).
+fn weight<const D: usize>(
+    inputs: &Inputs<'_, D>,
+    grid: Grid<D>,
+    constant: f64,
+) -> Result<ImageWeight<D>, RunError> {
+    let Some(field) = inputs.weight_field else { return Ok(ImageWeight::constant(constant)?) };
+    same_shape("weight field", inputs.image.frame(), field)?;
+    Ok(ImageWeight::field(grid, field.samples().to_f32())?)
+}
+
+/// A warning where d exceeds the box.
+fn coarse<const D: usize>(grid: &Grid<D>, distance: &NominalDistance<D>) -> Option<Warning> {
+    let (distance, extent) = (distance.least(), grid.bounds().extent());
+    let axis = (0..D).find(|&k| distance > extent[k])?;
+    Some(Warning::Coarse { axis, distance, extent: extent[axis] })
+}
+
+/// b at the samples: enhanced, or as given.
+fn potential_samples<const D: usize>(
+    inputs: &Inputs<'_, D>,
+    options: &MeshOptions<D>,
+    warnings: &mut Vec<Warning>,
+    watch: &mut dyn Watch,
+) -> Result<Vec<f32>, RunError> {
+    if inputs.is_potential {
+        return Ok(enhance::given_potential(inputs.image.samples().clone())?);
+    }
+    let smooth = options.features.smooth.or_else(|| width_for_faces(inputs, options));
+    let features = FeatureOptions { units: options.units, smooth, ..options.features };
+    let image_of = |kind| match (inputs.labels, kind) {
+        (Some(labels), Features::Labels) => labels,
+        _ => inputs.image,
+    };
+    let enhanced = match &options.mixture {
+        Some(mixture) => enhance::enhance_mixture(mixture, &features, image_of, watch)?,
+        None => enhance::enhance(image_of(features.features), &features, watch)?,
+    };
+    if enhanced.constant {
+        warnings.push(Warning::Constant);
+    }
+    Ok(enhanced.values)
+}
+
+/// How wide a potential that repels is made for Voronoi cells, where no width is asked for: a quarter of the
+/// least d, so that the rows of atoms on both sides feel it (Hale 2002).
+fn width_for_faces<const D: usize>(
+    inputs: &Inputs<'_, D>,
+    options: &MeshOptions<D>,
+) -> Option<f64> {
+    let is_line = matches!(options.features.features, Features::Dark | Features::Bright);
+    if options.kind != MeshKind::Voronoi || !options.features.repel || !is_line {
+        return None;
+    }
+    let grid = inputs.image.frame().grid(options.units);
+    let distance = match options.size {
+        _ if inputs.size_field.is_some() => return None,
+        Size::Default => default_distance(&grid),
+        Size::Constant(d) | Size::Range { min: d, .. } => d,
+        Size::Wavelength { .. } => return None,
+    };
+    Some((0.25 * distance).max(grid.least_step()))
+}
+
+fn nominal_distance<const D: usize>(
+    inputs: &Inputs<'_, D>,
+    grid: &Grid<D>,
+    options: &MeshOptions<D>,
+    samples: &[f32],
+) -> Result<NominalDistance<D>, RunError> {
+    if let Some(field) = inputs.size_field {
+        same_shape("size field", inputs.image.frame(), field)?;
+        let values = field.samples().to_f32();
+        return Ok(NominalDistance::from_field(grid, &values, GRADIENT_LIMIT)?);
+    }
+    Ok(match options.size {
+        Size::Default => NominalDistance::constant(grid, default_distance(grid))?,
+        Size::Constant(d) => NominalDistance::constant(grid, d)?,
+        Size::Range { min, max } => {
+            let grading = Grading { by: options.grade_by, ..Grading::new(min, max) };
+            NominalDistance::from_potential(grid, samples, &grading)?
+        }
+        Size::Wavelength { frequency, points } => {
+            let rate = (frequency * points) as f32;
+            let mut lengths = inputs.image.samples().to_f32();
+            lengths.iter_mut().for_each(|v| *v /= rate);
+            NominalDistance::from_field(grid, &lengths, GRADIENT_LIMIT)?
+        }
+    })
+}
+
+fn same_shape<const D: usize>(
+    name: &'static str,
+    frame: &Frame<D>,
+    field: &Image<D>,
+) -> Result<(), RunError> {
+    let (expected, found) = (frame.shape().to_vec(), field.frame().shape().to_vec());
+    if expected == found { Ok(()) } else { Err(RunError::Shape { name, expected, found }) }
+}

@@ -1,0 +1,270 @@
+//! The first stage: everything that atoms need to know of the image.
+
+use std::fmt;
+use std::sync::Arc;
+
+use crate::fields::{Fields, ImageWeight, Interpolation, NominalDistance, ScalarField};
+use crate::geometry::{Bounds, Point, compact_order};
+use crate::image::{Frame, Grid};
+use crate::lattice::{
+    GrowOptions, Lattice, Place, ScatterOptions, fill_holes, grow_within, scatter, settle,
+};
+use crate::mesh::Mesh;
+use crate::optimize::{EngineKind, OptimizeReport};
+use crate::region::{Outline, outline_facets};
+use crate::watch::Watch;
+
+use super::connected::Connected;
+use super::error::{RunError, Warning};
+use super::estimate::{self, Estimate};
+use super::filled::Filled;
+use super::method::Method;
+use super::options::{LatticeKind, MeshKind, MeshOptions};
+use super::outcome::Outcome;
+use super::settled::Settled;
+
+/// Everything that atoms need to know of the image: b(x), β(x), d(x), the mask's outline, labels and options.
+///
+/// All later stages share it; a clone costs nothing.
+#[derive(Clone)]
+pub struct Prepared<const D: usize>(Arc<Parts<D>>);
+
+/// What [`Prepared`] holds.
+pub(super) struct Parts<const D: usize> {
+    pub method: Method<D>,
+    pub options: MeshOptions<D>,
+    pub frame: Frame<D>,
+    pub grid: Grid<D>,
+    pub potential: ScalarField<D>,
+    pub weight: ImageWeight<D>,
+    pub distance: NominalDistance<D>,
+    /// Where the mesh ends, if it does not fill the box.
+    pub outline: Option<Outline<D>>,
+    pub labels: Option<Vec<i32>>,
+    pub warnings: Vec<Warning>,
+}
+
+impl<const D: usize> fmt::Debug for Prepared<D> {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        let Parts { options, frame, .. } = &*self.0;
+        f.debug_struct("Prepared").field("frame", frame).field("options", options).finish()
+    }
+}
+
+impl<const D: usize> Prepared<D> {
+    pub(super) fn new(parts: Parts<D>) -> Self {
+        Self(Arc::new(parts))
+    }
+
+    pub(super) fn parts(&self) -> &Parts<D> {
+        &self.0
+    }
+
+    /// What was chosen.
+    pub fn options(&self) -> &MeshOptions<D> {
+        &self.0.options
+    }
+
+    /// The image's frame.
+    pub fn frame(&self) -> &Frame<D> {
+        &self.0.frame
+    }
+
+    /// The image's box, in lattice units.
+    pub fn bounds(&self) -> Bounds<D> {
+        self.0.grid.bounds()
+    }
+
+    /// The fields that atoms move in.
+    pub fn fields(&self) -> Fields<'_, D> {
+        let Parts { potential, weight, distance, .. } = &*self.0;
+        Fields { potential, weight, distance }
+    }
+
+    /// b(x).
+    pub fn potential(&self) -> &ScalarField<D> {
+        &self.0.potential
+    }
+
+    /// d(x).
+    pub fn distance(&self) -> &NominalDistance<D> {
+        &self.0.distance
+    }
+
+    /// Where the mesh ends, if a mask says so.
+    pub fn outline(&self) -> Option<&Outline<D>> {
+        self.0.outline.as_ref()
+    }
+
+    /// What was odd so far.
+    pub fn warnings(&self) -> &[Warning] {
+        &self.0.warnings
+    }
+
+    /// What the rest of the work will take.
+    pub fn estimate(&self) -> Estimate {
+        let Parts { method, options, grid, distance, .. } = &*self.0;
+        let filling = method.filling(options.lattice);
+        let share = self.outline().map_or(1.0, Outline::mean_share);
+        let atoms = share * estimate::atoms(grid, distance, filling);
+        let field = options.optimize.engine == EngineKind::Sampled;
+        let spline = options.interpolation == Interpolation::Spline;
+        let smooth = options.optimize.smoothing_steps > 0;
+        // looking for crests takes two volumes and a copy of the potential
+        let mirrored = self.pairs_atoms() && self.potential().range().1 > 0.0;
+        let copies = [field, spline, smooth, smooth && spline, mirrored, mirrored, mirrored];
+        let copies = copies.into_iter().filter(|&c| c).count();
+        Estimate::new::<D>(grid.sample_count(), atoms, 1 + copies)
+    }
+
+    /// Fills the box with atoms.
+    ///
+    /// # Errors
+    /// [`RunError::Memory`] if more is needed than [`MeshOptions::memory_limit`] allows; [`RunError::Lattice`];
+    /// [`RunError::Cancelled`].
+    pub fn fill(&self, watch: &mut dyn Watch) -> Result<Filled<D>, RunError> {
+        (self.0.method.stages().fill)(self, watch)
+    }
+
+    /// Goes on from atoms of one's own, not yet settled.
+    ///
+    /// # Errors
+    /// [`RunError::OtherBox`] if they fill another box than the image's.
+    pub fn with_atoms(&self, lattice: Lattice<D>) -> Result<Filled<D>, RunError> {
+        self.check_box(lattice.bounds())?;
+        Ok(Filled::new(self.clone(), lattice))
+    }
+
+    /// Goes on from atoms that are where they shall be, such as an editor's.
+    ///
+    /// # Errors
+    /// [`RunError::OtherBox`] if they fill another box than the image's.
+    pub fn with_settled(&self, lattice: Lattice<D>) -> Result<Settled<D>, RunError> {
+        self.check_box(lattice.bounds())?;
+        let report = OptimizeReport::new(self.0.options.optimize.engine);
+        Ok(Settled { run: self.clone(), lattice, report, mirror_report: None })
+    }
+
+    /// Goes on from a mesh in lattice coordinates, such as a file's moved back by
+    /// [`lattice_mesh`](super::lattice_mesh). Points on sides of the box stay on them; those on the rest of the
+    /// mesh's boundary stay where they are.
+    ///
+    /// # Errors
+    /// [`RunError::OtherBox`] if a point is outside the image's box.
+    pub fn with_mesh(&self, mesh: Mesh<D>) -> Result<Connected<D>, RunError> {
+        let bounds = self.bounds();
+        if let Some(p) = mesh.points().iter().find(|p| !bounds.contains(p)) {
+            self.check_box(&Bounds { min: *p, max: *p })?;
+        }
+        let inside = |p: &Point<D>, k: usize| bounds.min[k] < p[k] && p[k] < bounds.max[k];
+        let of = |p| (0..D).filter(|&k| inside(p, k)).fold(0, |set: u8, k| set | 1 << k);
+        let mut freedom: Vec<u8> = mesh.points().iter().map(of).collect();
+        for &point in outline_facets(&mesh, &bounds).as_flattened() {
+            freedom[point as usize] = 0;
+        }
+        let report = OptimizeReport::new(self.0.options.optimize.engine);
+        Ok(Connected { run: self.clone(), mesh, freedom, report, mirror_report: None })
+    }
+
+    /// Runs all stages: for Delaunay's cells filled, settled, connected, improved; for Voronoi's filled, settled
+    /// and divided into cells.
+    ///
+    /// # Errors
+    /// [`RunError`] if memory does not suffice, the energy is not finite, or the work was cancelled.
+    pub fn run(self, watch: &mut dyn Watch) -> Result<Outcome<D>, RunError> {
+        let filled = self.fill(watch)?;
+        match self.0.options.kind {
+            MeshKind::Delaunay => {
+                filled.settle(watch)?.connect(watch)?.improve(watch)?.finish(watch)
+            }
+            MeshKind::Voronoi => filled.settle(watch)?.divide(watch)?.finish(watch),
+        }
+    }
+
+    fn check_box(&self, found: &Bounds<D>) -> Result<(), RunError> {
+        let expected = self.bounds();
+        if *found == expected {
+            return Ok(());
+        }
+        let texts = [expected, *found].map(|b| format!("{:?} to {:?}", b.min, b.max));
+        let [expected, found] = texts;
+        Err(RunError::OtherBox { expected, found })
+    }
+
+    /// Whether pairs of atoms are made where features repel.
+    pub(super) fn pairs_atoms(&self) -> bool {
+        let Parts { options, outline, .. } = &*self.0;
+        options.kind == MeshKind::Voronoi && options.mirror && outline.is_none()
+    }
+
+    /// Whether atoms stay as they were grown: nothing pulls them, and they are evened out already.
+    pub(super) fn stays_as_grown(&self) -> bool {
+        let Parts { method, options, weight, distance, outline, .. } = &*self.0;
+        let is_crystal = options.lattice != LatticeKind::Random && outline.is_none();
+        let is_even = is_crystal && method.evening().is_some() && !distance.is_constant();
+        is_even && (weight.as_constant() == Some(0.0) || self.potential().range() == (0.0, 0.0))
+    }
+}
+
+/// [`Prepared::fill`].
+pub(super) fn fill<const D: usize>(
+    run: &Prepared<D>,
+    watch: &mut dyn Watch,
+) -> Result<Filled<D>, RunError> {
+    let Parts { method, options, frame, distance, outline, .. } = run.parts();
+    let estimate = run.estimate();
+    if let Some(available) = options.memory_limit
+        && estimate.memory > available
+    {
+        let least = distance.least();
+        return Err(RunError::Memory { needed: estimate.memory, available, least });
+    }
+    let (bounds, units) = (run.bounds(), options.units);
+    let seed_points: Vec<Point<D>> = (options.seed_points.iter())
+        .map(|p| frame.world_to_lattice(units, p))
+        // a point meant to be on the boundary may come back a rounding outside
+        .map(|p| snap_to(&p, &bounds))
+        .collect();
+    let lattice = match method.crystal(options.lattice)? {
+        Some(crystal) => {
+            let spacing_factor = options.spacing_factor;
+            let grow = GrowOptions { spacing_factor, seed_points };
+            let place = Place { bounds, distance, outline: outline.as_ref() };
+            even_out(run, grow_within(crystal, place, &grow, watch)?, watch)?
+        }
+        None => {
+            let options = ScatterOptions { seed: options.optimize.seed, seed_points };
+            scatter(method.scatterer(), bounds, distance, &options, watch)?
+        }
+    };
+    let order = compact_order(lattice.atoms());
+    Ok(Filled::new(run.clone(), lattice.reordered(&order)))
+}
+
+/// Fills and settles a crystal that has grown where d varies.
+fn even_out<const D: usize>(
+    run: &Prepared<D>,
+    lattice: Lattice<D>,
+    watch: &mut dyn Watch,
+) -> Result<Lattice<D>, RunError> {
+    let Parts { method, distance, outline, .. } = run.parts();
+    let is_even = distance.is_constant() || outline.is_some();
+    let (Some(evening), false) = (method.evening(), is_even) else {
+        return Ok(lattice);
+    };
+    let scatterer = method.scatterer();
+    let lattice = fill_holes(scatterer, lattice.along_curve(), distance, evening.rounds, watch)?;
+    let mut lattice = lattice.along_curve();
+    for _ in 0..evening.meshes {
+        lattice = settle(scatterer, lattice, distance, evening.sweeps, watch)?;
+    }
+    Ok(lattice)
+}
+
+/// The nearest point of the box, if it is within a rounding of it; else the point itself.
+fn snap_to<const D: usize>(p: &Point<D>, bounds: &Bounds<D>) -> Point<D> {
+    let inside = bounds.clamp(p);
+    let extent = bounds.extent();
+    let near = (0..D).all(|k| (inside[k] - p[k]).abs() <= 1e-9 * extent[k]);
+    if near { inside } else { *p }
+}

@@ -1,0 +1,127 @@
+//! The figures of a mesh.
+
+use crate::geometry::Bounds;
+use crate::image::{Frame, Grid, Samples};
+use crate::measure::{
+    AlignmentOptions, AlignmentReport, FidelityReport, HomogeneityReport, MeasureError,
+    PrecisionOptions, SampledPotential, ShapeReport, SpreadReport, WantedSize, alignment, alignment_of_faces, features,
+    fidelity, precision, shape, spread,
+};
+use crate::mesh::{Mesh, PolyReport};
+use crate::watch::Watch;
+
+use super::error::RunError;
+use super::outcome::{Outcome, in_samples};
+
+/// The figures of a mesh: its shape, and how it follows the image.
+#[derive(Clone, Debug, PartialEq, serde::Serialize)]
+pub struct MeshReport {
+    /// Shape of the cells, in lattice space.
+    pub shape: ShapeReport,
+    /// How facets follow the potential's valleys.
+    pub alignment: AlignmentReport,
+    /// All angles, and edges over d.
+    pub spread: SpreadReport,
+    /// How well the mesh carries an image, if one was given.
+    pub fidelity: Option<FidelityReport>,
+    /// How pure cells are, if labels were given.
+    pub homogeneity: Option<HomogeneityReport>,
+}
+
+/// The figures of a mesh of polygons or polyhedra.
+#[derive(Clone, Debug, PartialEq, serde::Serialize)]
+pub struct VoronoiReport {
+    /// Shape of the cells, in lattice space.
+    pub shape: PolyReport,
+    /// How faces follow the valleys of −|b|: features attract or repel.
+    pub alignment: AlignmentReport,
+}
+
+impl MeshReport {
+    /// Measures a mesh in lattice coordinates against the samples of b on a grid, for features that
+    /// edges of the length `size`, in lattice units, can follow. Fidelity and homogeneity, which need
+    /// more, are left out.
+    ///
+    /// # Errors
+    /// [`MeasureError`], also when cancelled.
+    pub fn new<const D: usize>(
+        mesh: &Mesh<D>,
+        grid: &Grid<D>,
+        potential: &[f32],
+        size: WantedSize<'_>,
+        watch: &mut dyn Watch,
+    ) -> Result<Self, MeasureError> {
+        Self::within(mesh, Some(grid.bounds()), (grid, potential), size, watch)
+    }
+
+    /// [`MeshReport::new`] for a mesh that fills `bounds`, or, if `None`, a part of the grid's box.
+    ///
+    /// # Errors
+    /// As [`MeshReport::new`].
+    pub fn within<const D: usize>(
+        mesh: &Mesh<D>,
+        bounds: Option<Bounds<D>>,
+        (grid, potential): (&Grid<D>, &[f32]),
+        size: WantedSize<'_>,
+        watch: &mut dyn Watch,
+    ) -> Result<Self, MeasureError> {
+        let spread = spread(mesh, size, watch)?;
+        let shape = shape(mesh, bounds.as_ref(), watch)?;
+        let size = samples_of(size.mean, grid);
+        let b = SampledPotential { values: potential, shape: grid.shape };
+        let found = features(b, size, watch)?;
+        let options = AlignmentOptions::new(size);
+        let mesh = in_samples(mesh, grid);
+        let mut alignment = alignment(&mesh, &found, &options, watch)?;
+        let selected = precision(&mesh, b, &found, PrecisionOptions::new(size), watch)?;
+        alignment.selected = Some(selected);
+        Ok(Self { shape, alignment, spread, fidelity: None, homogeneity: None })
+    }
+}
+
+/// A length in samples: by the geometric mean over the axes, where steps differ.
+fn samples_of<const D: usize>(length: f64, grid: &Grid<D>) -> f64 {
+    length / grid.step.iter().product::<f64>().powf(1.0 / D as f64)
+}
+
+/// [`Outcome::cells_report`].
+pub(super) fn of_cells<const D: usize>(
+    outcome: &Outcome<D>,
+    watch: &mut dyn Watch,
+) -> Result<Option<VoronoiReport>, RunError> {
+    let (Some(cells), Some(in_samples)) = (outcome.cells(), outcome.sample_cells()) else {
+        return Ok(None);
+    };
+    let (potential, distance) = (outcome.potential(), outcome.distance());
+    let grid = potential.grid();
+    let size = samples_of(distance.mean(), grid);
+    let valleys: Vec<f32> = potential.samples().iter().map(|b| -b.abs()).collect();
+    let b = SampledPotential { values: &valleys, shape: grid.shape };
+    let found = features(b, size, watch)?;
+    let options = AlignmentOptions::new(size);
+    let alignment = alignment_of_faces(&in_samples, &found, &options, watch)?;
+    Ok(Some(VoronoiReport { shape: PolyReport::new(cells, &grid.bounds()), alignment }))
+}
+
+/// [`Outcome::report`].
+pub(super) fn of_mesh<const D: usize>(
+    outcome: &Outcome<D>,
+    watch: &mut dyn Watch,
+) -> Result<MeshReport, RunError> {
+    let at_points = Some(outcome.distance_at_points());
+    let size = WantedSize { mean: outcome.distance().mean(), at_points };
+    let b = (outcome.potential().grid(), outcome.potential().samples());
+    Ok(MeshReport::within(outcome.mesh(), outcome.bounds(), b, size, watch)?)
+}
+
+/// [`Outcome::fidelity`].
+pub(super) fn fidelity_of<const D: usize>(
+    outcome: &Outcome<D>,
+    samples: &Samples,
+    watch: &mut dyn Watch,
+) -> Result<FidelityReport, RunError> {
+    let grid = outcome.potential().grid();
+    let frame = Frame::new(grid.shape).and_then(|frame| frame.with_spacing(grid.step));
+    let frame = frame.expect("a grid's shape and step were a frame's");
+    Ok(fidelity(outcome.mesh(), (&frame, samples), watch)?)
+}
