@@ -7,7 +7,7 @@
 //! - raw images, by the finders of [`crate::enhance`].
 //!
 //! Points are linked into groups, the small and weak of which are left out ([`linked`], [`in_large_groups`]).
-//! Groups become a potential again ([`widen`]) or evenly spaced sites for atoms ([`sites`]).
+//! Groups become a potential again (`widen`) or evenly spaced sites for atoms (`sites`).
 
 mod bins;
 mod groups;

@@ -121,7 +121,7 @@ pub struct FeatureOptions {
     /// How edges are found by [`EdgeOperator::Crest`].
     #[serde(rename = "crests")]
     pub edges: CrestOptions,
-    /// Takes noise off the image first and keeps its edges ([`denoise`](super::denoise), its other options by default):
+    /// Takes noise off the image first and keeps its edges ([`denoise`](fn@super::denoise), its other options by default):
     /// h / σ, how much patches of the image may differ, in standard deviations of the noise, and still be averaged; 0.01
     /// to 100. Labels are names, and stay as they are. Default: the image stays as it is.
     pub denoise: Option<f64>,
