@@ -35,7 +35,7 @@ impl Interpolation {
 
 /// A number at every place: the potential b(x), the weight β(x), the share of a mask. Constant beyond the
 /// box of its samples.
-#[derive(Clone, Debug)]
+#[derive(Clone, Debug, PartialEq)]
 pub struct ScalarField<const D: usize> {
     grid: Grid<D>,
     samples: Vec<f32>,
@@ -138,6 +138,7 @@ impl<const D: usize> ScalarField<D> {
     }
 
     /// The value at a lattice point.
+    #[inline]
     pub fn value(&self, p: &Point<D>) -> f64 {
         let mut gradient = [0.0; D];
         self.value_and_gradient(p, &mut gradient)

@@ -10,6 +10,7 @@ mod default;
 mod grading;
 mod limit;
 
+use super::{Interpolation, ScalarField};
 use crate::geometry::{Bounds, Point};
 use crate::image::Grid;
 use coarse::{Take, coarse_grid, reduce};
@@ -84,11 +85,8 @@ pub enum DistanceError {
 /// The nominal distance d(x) over an image's box, in lattice units.
 #[derive(Clone, Debug, PartialEq)]
 pub struct NominalDistance<const D: usize> {
-    /// Nodes over the image's box; of a constant, one.
-    nodes: Grid<D>,
-    inverse_step: [f64; D],
-    /// d at the nodes, x fastest; empty for a constant.
-    values: Vec<f32>,
+    /// d at nodes over the image's box; `None`: it is the same everywhere.
+    nodes: Option<ScalarField<D>>,
     /// The image's box.
     bounds: Bounds<D>,
     least: f64,
@@ -105,9 +103,7 @@ impl<const D: usize> NominalDistance<D> {
         check_length(distance)?;
         check_step(grid, distance)?;
         Ok(Self {
-            nodes: Grid { shape: [1; D], step: grid.step },
-            inverse_step: [0.0; D],
-            values: Vec::new(),
+            nodes: None,
             bounds: grid.bounds(),
             least: distance,
             greatest: distance,
@@ -144,12 +140,13 @@ impl<const D: usize> NominalDistance<D> {
     fn new(nodes: Grid<D>, values: Vec<f32>, grid: &Grid<D>) -> Self {
         let least = values.iter().copied().fold(f32::INFINITY, f32::min).into();
         let greatest = values.iter().copied().fold(0.0, f32::max).into();
-        let constant = least == greatest;
+        let is_constant = least == greatest;
         Self {
-            inverse_step: nodes.step.map(f64::recip),
-            greatest_slope: if constant { 0.0 } else { greatest_slope(&values, &nodes) },
-            nodes: if constant { Grid { shape: [1; D], step: nodes.step } } else { nodes },
-            values: if constant { Vec::new() } else { values },
+            greatest_slope: if is_constant { 0.0 } else { greatest_slope(&values, &nodes) },
+            nodes: (!is_constant).then(|| {
+                ScalarField::unchecked(nodes, values, Interpolation::Linear)
+                    .expect("there is one value a node")
+            }),
             bounds: grid.bounds(),
             least,
             greatest,
@@ -159,37 +156,7 @@ impl<const D: usize> NominalDistance<D> {
     /// d at a point; outside the box, d at the nearest point of the box.
     #[inline]
     pub fn at(&self, p: &Point<D>) -> f64 {
-        if self.values.is_empty() { self.least } else { self.interpolate(p) }
-    }
-
-    #[inline]
-    fn interpolate(&self, p: &Point<D>) -> f64 {
-        let (mut base, mut stride) = (0, 1);
-        let mut next = [0; D];
-        let mut share = [0.0; D];
-        for k in 0..D {
-            let last = self.nodes.shape[k] - 1;
-            let u = (p[k] * self.inverse_step[k]).clamp(0.0, last as f64);
-            let i = (u as usize).min(last.saturating_sub(1));
-            share[k] = u - i as f64;
-            base += i * stride;
-            next[k] = if last > 0 { stride } else { 0 };
-            stride *= self.nodes.shape[k];
-        }
-        let mut sum = 0.0;
-        for corner in 0..1 << D {
-            let (mut weight, mut index) = (1.0, base);
-            for k in 0..D {
-                if corner >> k & 1 == 1 {
-                    weight *= share[k];
-                    index += next[k];
-                } else {
-                    weight *= 1.0 - share[k];
-                }
-            }
-            sum += weight * f64::from(self.values[index]);
-        }
-        sum
+        self.nodes.as_ref().map_or(self.least, |nodes| nodes.value(p))
     }
 
     /// The image's box.
@@ -214,7 +181,7 @@ impl<const D: usize> NominalDistance<D> {
 
     /// Whether d is the same everywhere.
     pub fn is_constant(&self) -> bool {
-        self.values.is_empty()
+        self.nodes.is_none()
     }
 
     /// The mean of d over the box.
@@ -234,10 +201,8 @@ impl<const D: usize> NominalDistance<D> {
     /// The mean of a function of d over the box, by the trapezoidal rule. Rows are added in their order,
     /// whatever threads took them.
     fn average(&self, f: impl Fn(f64) -> f64 + Sync) -> f64 {
-        if self.values.is_empty() {
-            return f(self.least);
-        }
-        let shape = self.nodes.shape;
+        let Some(nodes) = &self.nodes else { return f(self.least) };
+        let shape = nodes.grid().shape;
         let row = |(r, row): (usize, &[f32])| {
             let (mut rest, mut across) = (r, 1.0);
             for &n in &shape[1..] {
@@ -258,7 +223,8 @@ impl<const D: usize> NominalDistance<D> {
                 if row.len() > 1 { f(row[0].into()) + f(row[row.len() - 1].into()) } else { 0.0 };
             across * (whole - 0.5 * ends)
         };
-        let sums: Vec<f64> = self.values.par_chunks_exact(shape[0]).enumerate().map(row).collect();
+        let sums: Vec<f64> =
+            nodes.samples().par_chunks_exact(shape[0]).enumerate().map(row).collect();
         let weights: usize = shape.iter().map(|n| n.saturating_sub(1).max(1)).product();
         sums.iter().sum::<f64>() / weights as f64
     }
