@@ -15,7 +15,7 @@ use super::*;
 use crate::grid::FacetSet;
 use crate::problem::{Barrier, Boundary, Condition, Control, Problem, Value, Well};
 
-/// What differs between 2-D and 3-D here: the connector.
+/// What differs between the plane and space here: the connector.
 trait Dimension<const D: usize> {
     fn delaunay() -> Delaunay<D>;
 }
