@@ -112,10 +112,9 @@ pub(crate) fn check_extension(path: Option<&PathBuf>, wanted: &str) -> Result<()
 
 /// Refuses a file for a potential whose format does not hold single precision.
 pub(crate) fn check_potential(path: &Path) -> Result<(), JobError> {
-    use ImageFormat::{Nifti, NiftiGz, Npy, Nrrd, Raw, Tiff, Vti};
     match ImageFormat::from_path(path) {
-        Some(Npy | Nifti | NiftiGz | Nrrd | Vti | Tiff | Raw) => Ok(()),
-        _ => Err(unknown_extension(path, ".npy, .nii, .nii.gz, .nrrd, .vti, .tif, .raw")),
+        Some(format) if format.writes_floats() => Ok(()),
+        _ => Err(unknown_extension(path, &ImageFormat::usual_written_endings(", ", true))),
     }
 }
 

@@ -106,7 +106,7 @@ pub fn measure<const D: usize>(
     let report = MeshReport::new(&mesh, &grid, &against.potential, size, session);
     let mut report = report.map_err(|e| JobError::from(e).about(&request.mesh))?;
     if let Some(image) = &against.image {
-        let found = fidelity(&loaded.mesh, (image.frame(), image.samples()), session);
+        let found = fidelity(&loaded.mesh, image.frame(), image.samples(), session);
         let found = found.map_err(|e| JobError::from(e).about_any(request.image.as_deref()))?;
         report.fidelity = Some(found);
     }

@@ -20,7 +20,7 @@ pub fn read(path: &Path) -> Result<AnyMesh, JobError> {
     read_mesh(path).map_err(|e| {
         match e {
             MeshReadError::Format(_) => {
-                let known = MeshFormat::EXTENSIONS;
+                let known = MeshFormat::endings();
                 JobError::misuse(format!(
                     "unknown extension of a mesh file; expected one of {known}"
                 ))

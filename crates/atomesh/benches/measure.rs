@@ -74,7 +74,7 @@ fn measures(criterion: &mut Criterion) {
         b.iter(|| sample_in_frame(&mesh, &frame, &image, options, &mut Silent));
     });
     group.bench_function("fidelity", |b| {
-        b.iter(|| fidelity(&mesh, (&frame, &image), &mut Silent));
+        b.iter(|| fidelity(&mesh, &frame, &image, &mut Silent));
     });
     group.finish();
 }

@@ -62,13 +62,12 @@ fn scene() -> impl TypedValueParser<Value = Scene> {
 /// # Errors
 /// [`JobError`] if an option is out of its range or a file cannot be written.
 pub fn run(args: &SynthArgs, progress: &mut Progress) -> Result<String, JobError> {
-    use ImageFormat::{Nifti, NiftiGz, Npy, Nrrd, Png, Raw, Tiff, Vti};
-    let format = ImageFormat::from_path(&args.output);
-    if !matches!(format, Some(Png | Npy | Nifti | NiftiGz | Nrrd | Vti | Tiff | Raw)) {
-        let known = ".png, .npy, .nii, .nii.gz, .nrrd, .vti, .tif, .raw";
-        return Err(unknown_extension(&args.output, known));
+    let format = ImageFormat::from_path(&args.output).filter(|format| format.is_written());
+    if format.is_none() {
+        let known = ImageFormat::usual_written_endings(", ", false);
+        return Err(unknown_extension(&args.output, &known));
     }
-    let bytes = args.bytes || format == Some(Png);
+    let bytes = args.bytes || format == Some(ImageFormat::PNG);
     let drawn = |session: &mut Session<'_>| match args.scene.dimension() {
         2 => draw::<2>(args, 256, bytes, session),
         _ => draw::<3>(args, 96, bytes, session),

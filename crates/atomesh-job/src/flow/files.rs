@@ -33,7 +33,7 @@ impl FlowFiles {
         check_extension(options.streamlines.as_ref(), "vtp")?;
         check_extension(options.fluxes.as_ref(), "json")?;
         if let Some(path) = &options.output {
-            MeshFormat::of(path).map_err(|_| unknown_extension(path, MeshFormat::EXTENSIONS))?;
+            MeshFormat::of(path).map_err(|_| unknown_extension(path, &MeshFormat::endings()))?;
         }
         Ok(Self {
             output: options.output.clone(),

@@ -25,7 +25,7 @@ impl OutputFormat {
         let format = MeshFormat::of(mesh);
         if is_voronoi {
             return match format {
-                Ok(MeshFormat::PolyMesh) => Ok(Self::VoronoiFoam),
+                Ok(MeshFormat::OpenFoam) => Ok(Self::VoronoiFoam),
                 Ok(MeshFormat::Vtu) => Ok(Self::VoronoiVtu),
                 _ => {
                     let message =
@@ -34,7 +34,7 @@ impl OutputFormat {
                 }
             };
         }
-        let format = format.map_err(|_| unknown_extension(mesh, MeshFormat::EXTENSIONS))?;
+        let format = format.map_err(|_| unknown_extension(mesh, &MeshFormat::endings()))?;
         let Some(version) = msh else { return Ok(Self::Simplices(format)) };
         match format {
             MeshFormat::Msh(_, encoding) => {

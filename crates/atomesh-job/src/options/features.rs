@@ -1,8 +1,7 @@
 //! How the image becomes a potential.
 
 use atomesh::enhance::{
-    EdgeCrestOptions, EdgeOperator, FaultOptions, FeatureOptions, HorizonOptions, Mixture,
-    Polarity, RidgeOptions,
+    CrestOptions, EdgeOperator, FaultOptions, FeatureOptions, HorizonOptions, Mixture, Polarity,
 };
 
 use super::section::section;
@@ -53,7 +52,7 @@ section! {
             value_parser = number_in(0.0, 1000.0, "a number of samples from 0 to 1000"))]
         pub normal_scale: f64,
         /// Least strength of features where connected to stronger parts (hysteresis), 0 to 1. Default: 0.3 for
-        /// ridges, 0.15 for horizons, 0.1 for faults, 0.2 for edge crests
+        /// ridges, 0.15 for horizons and faults, 0.2 for edge crests
         #[arg(long, value_name = "SHARE", value_parser = number_in(0.0, 1.0, "a number from 0 to 1"))]
         pub low: f64,
         /// Strength that each feature must reach somewhere (hysteresis), 0 to 1. Default: 0.4 for horizons, 0.5 for
@@ -97,6 +96,14 @@ impl PotentialOptions {
     /// The core's options: what is not given comes from `basis`.
     pub fn feature_options(&self, basis: FeatureOptions) -> FeatureOptions {
         let single = self.features.as_ref().and_then(|mixture| mixture.0.single());
+        let crests = CrestOptions {
+            polarity: self.polarity,
+            scale: self.scale,
+            normal_scale: self.normal_scale,
+            low: self.low,
+            high: self.high,
+            least_length: self.least_length,
+        };
         FeatureOptions {
             features: single.unwrap_or(basis.features),
             edge_operator: self.edge_operator.unwrap_or(basis.edge_operator),
@@ -104,50 +111,16 @@ impl PotentialOptions {
             smooth: self.smooth.or(basis.smooth),
             denoise: self.denoise.or(basis.denoise),
             repel: self.repel.unwrap_or(basis.repel),
-            ridges: self.ridges(basis.ridges),
-            horizons: self.horizons(basis.horizons),
-            faults: self.faults(basis.faults),
-            crests: EdgeCrestOptions {
-                scale: self.edge_scale.or(basis.crests.scale),
-                low: self.low.map_or(basis.crests.low, |low| low as f32),
-                high: self.high.map_or(basis.crests.high, |high| high as f32),
-                least_length: self.least_length.unwrap_or(basis.crests.least_length),
+            ridges: crests.or(basis.ridges),
+            horizons: HorizonOptions { crests: crests.or(basis.horizons.crests), ..basis.horizons },
+            faults: FaultOptions {
+                layer_reach: self.layer_reach.unwrap_or(basis.faults.layer_reach),
+                dip_reach: self.dip_reach.unwrap_or(basis.faults.dip_reach),
+                least_dip: self.least_dip.unwrap_or(basis.faults.least_dip),
+                crests: crests.or(basis.faults.crests),
+                ..basis.faults
             },
-            ..basis
-        }
-    }
-
-    fn ridges(&self, basis: RidgeOptions) -> RidgeOptions {
-        RidgeOptions {
-            polarity: self.polarity.unwrap_or(basis.polarity),
-            scale: self.scale.unwrap_or(basis.scale),
-            normal_scale: self.normal_scale.unwrap_or(basis.normal_scale),
-            low: self.low.map_or(basis.low, |low| low as f32),
-            high: self.high.map_or(basis.high, |high| high as f32),
-            least_length: self.least_length.unwrap_or(basis.least_length),
-        }
-    }
-
-    fn horizons(&self, basis: HorizonOptions) -> HorizonOptions {
-        HorizonOptions {
-            polarity: self.polarity.unwrap_or(basis.polarity),
-            scale: self.scale.unwrap_or(basis.scale),
-            normal_scale: self.normal_scale.unwrap_or(basis.normal_scale),
-            low: self.low.map_or(basis.low, |low| low as f32),
-            high: self.high.map_or(basis.high, |high| high as f32),
-            least_length: self.least_length.unwrap_or(basis.least_length),
-            ..basis
-        }
-    }
-
-    fn faults(&self, basis: FaultOptions) -> FaultOptions {
-        FaultOptions {
-            layer_reach: self.layer_reach.unwrap_or(basis.layer_reach),
-            dip_reach: self.dip_reach.unwrap_or(basis.dip_reach),
-            least_dip: self.least_dip.unwrap_or(basis.least_dip),
-            low: self.low.unwrap_or(basis.low),
-            high: self.high.unwrap_or(basis.high),
-            least_length: self.least_length.unwrap_or(basis.least_length),
+            edges: CrestOptions { scale: self.edge_scale, ..crests }.or(basis.edges),
             ..basis
         }
     }

@@ -5,10 +5,8 @@
 //! each atom). Each edit says what it changed ([`Changes`]). The mesh is always the one that connecting all atoms
 //! again would give.
 //!
-//! Cost: that of the change. The editor keeps the cells' neighbours ([`cells`]) and knows which atoms are near a
-//! place ([`bins`]).
+//! Cost: that of the change. The editor keeps the cells' neighbours ([`cells`]), and which atoms are near a place.
 
-mod bins;
 mod cells;
 mod changes;
 mod error;
@@ -21,12 +19,12 @@ pub use error::EditError;
 
 use std::fmt;
 
-use crate::geometry::{Bounds, Point};
+use crate::crests::Bins;
+use crate::geometry::{Bounds, Point, distance_squared};
 use crate::lattice::Lattice;
 use crate::mesh::{ConnectError, Delaunay, Mesh};
 use crate::watch::Watch;
 
-use bins::AtomBins;
 use cells::{AtomEdit, Cells};
 use changes::CellChanges;
 
@@ -69,7 +67,8 @@ pub struct Editor<const D: usize> {
     /// Atoms by name. The place of a removed atom stays, and its name is not used again.
     points: Vec<Point<D>>,
     states: Vec<State>,
-    bins: AtomBins<D>,
+    /// All atoms but the removed ones.
+    bins: Bins<D>,
     cells: Cells<D>,
 }
 
@@ -113,7 +112,7 @@ impl<const D: usize> Editor<D> {
             delaunay,
             bounds: *lattice.bounds(),
             states: (0..points.len()).map(state).collect(),
-            bins: AtomBins::new(lattice.bounds(), &points),
+            bins: Bins::of(lattice.bounds(), 0.0, points.iter().copied()),
             cells: Cells::new(&mesh),
             points,
         })
@@ -150,7 +149,7 @@ impl<const D: usize> Editor<D> {
         };
         let freedom = self.bounds.freedom(&at);
         self.states.push(State { is_removed: false, is_pinned: false, freedom, temperature: 1.0 });
-        self.bins.insert(atom, &at);
+        self.bins.push(&at);
         Ok((AtomId(atom), Changes::new(cells, Vec::new())))
     }
 
@@ -165,7 +164,7 @@ impl<const D: usize> Editor<D> {
         }
         let cells = self.follow(&[AtomEdit { atom: atom.0, to: None }])?;
         self.states[atom.0 as usize].is_removed = true;
-        self.bins.remove(atom.0, &p);
+        self.bins.remove(atom.0 as usize, &p);
         Ok(Changes::new(cells, Vec::new()))
     }
 
@@ -258,8 +257,8 @@ impl<const D: usize> Editor<D> {
         for &AtomEdit { atom, to } in edits {
             let Some(to) = to else { continue };
             let from = std::mem::replace(&mut self.points[atom as usize], to);
-            self.bins.remove(atom, &from);
-            self.bins.insert(atom, &to);
+            self.bins.remove(atom as usize, &from);
+            self.bins.put_back(atom as usize, &to);
             moves.push(AtomMove { atom: AtomId(atom), from, to });
         }
         Ok(Changes::new(cells, moves))
@@ -278,6 +277,18 @@ impl<const D: usize> Editor<D> {
             }
             error => EditError::Connect(error),
         })
+    }
+
+    /// The atoms nearer than `reach` to a place, ascending: in the same order whatever edits led here.
+    fn within(&self, around: &Point<D>, reach: f64) -> Vec<u32> {
+        let mut atoms = Vec::new();
+        self.bins.near(around, reach, |atom| {
+            if distance_squared(&self.points[atom], around).sqrt() < reach {
+                atoms.push(atom as u32);
+            }
+        });
+        atoms.sort_unstable();
+        atoms
     }
 
     fn state(&self, atom: AtomId) -> Result<&State, EditError> {

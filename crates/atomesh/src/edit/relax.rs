@@ -37,18 +37,13 @@ impl<const D: usize> Editor<D> {
             return Err(EditError::Reach { value: reach });
         }
         let felt = reach + ROOM * self.farthest_felt(around, reach, fields);
+        let atoms = self.within(around, felt);
         let mut part = Lattice::empty(self.bounds);
-        let mut atoms = Vec::new();
-        for atom in self.bins.near(around, felt) {
-            let p = self.points[atom as usize];
-            let r = distance_squared(&p, around).sqrt();
-            if r < felt {
-                let s = (r / reach).min(1.0);
-                let share = (1.0 - s * s * (3.0 - 2.0 * s)).clamp(0.0, 1.0) as f32;
-                let state = &self.states[atom as usize];
-                part.push(p, state.freedom, share * state.temperature_now());
-                atoms.push(atom);
-            }
+        for &atom in &atoms {
+            let (p, state) = (self.points[atom as usize], &self.states[atom as usize]);
+            let s = (distance_squared(&p, around).sqrt() / reach).min(1.0);
+            let share = (1.0 - s * s * (3.0 - 2.0 * s)).clamp(0.0, 1.0) as f32;
+            part.push(p, state.freedom, share * state.temperature_now());
         }
         let options = OptimizeOptions { smoothing_steps: 0, ..options.clone() };
         let (part, report) = optimize(part, fields, &options, watch)?.into_parts();
@@ -66,7 +61,7 @@ impl<const D: usize> Editor<D> {
     fn farthest_felt(&self, around: &Point<D>, reach: f64, fields: FieldsView<'_, D>) -> f64 {
         let distance = fields.distance;
         let mut greatest = distance.at(around);
-        for atom in self.bins.near(around, reach) {
+        for atom in self.within(around, reach) {
             greatest = distance.at(&self.points[atom as usize]).max(greatest);
         }
         let growth = 1.0 - 0.5 * pair::CUTOFF * distance.greatest_slope();

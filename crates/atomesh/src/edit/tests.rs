@@ -5,7 +5,6 @@ use rand::{RngExt, SeedableRng};
 use rand_pcg::Pcg64;
 
 use super::*;
-use crate::energy::pair;
 use crate::fields::{FieldsView, ImageWeight, Interpolation, NominalDistance, ScalarField};
 use crate::geometry::distance_squared;
 use crate::image::Grid;
@@ -140,11 +139,9 @@ fn edit<const D: usize>(mut editor: Editor<D>, seed: u64, count: usize) -> [usiz
 
 /// Checks the atoms that bins find within 5 samples of a place.
 fn finds_atoms_as_a_search_of_all<const D: usize>(editor: &Editor<D>, around: &Point<D>) {
-    let is_near = |p: &Point<D>| distance_squared(p, around) < 25.0;
-    let mut found = editor.bins.near(around, 5.0);
-    found.retain(|&atom| is_near(&editor.points[atom as usize]));
+    let is_near = |p: &Point<D>| distance_squared(p, around).sqrt() < 5.0;
     let all = editor.atoms().filter(|(_, p)| is_near(p)).map(|(atom, _)| atom.0);
-    assert_eq!(found, all.collect::<Vec<u32>>());
+    assert_eq!(editor.within(around, 5.0), all.collect::<Vec<u32>>());
 }
 
 proptest! {
@@ -184,7 +181,7 @@ impl<const D: usize> Sheet<D> {
         let b = |i: usize| -(-(((i % 17) as f32 - 6.6) / 1.5).powi(2)).exp();
         let samples = (0..grid.sample_count()).map(b).collect();
         Self {
-            potential: ScalarField::new(grid, samples, Interpolation::Linear).unwrap(),
+            potential: ScalarField::potential(grid, samples, Interpolation::Linear).unwrap(),
             weight: ImageWeight::constant(0.4).unwrap(),
             distance: NominalDistance::constant(&grid, D_NOMINAL).unwrap(),
         }
@@ -228,8 +225,6 @@ fn relaxing_moves_what_is_near<const D: usize>(crystal: &Crystal<D>, delaunay: D
     let options = OptimizeOptions { perturbation: 0.0, smoothing_steps: 0, ..options };
     let settled = optimize(whole.clone(), fields, &options, &mut Silent).unwrap();
     let mut editor = Editor::new(whole, editor.delaunay, &mut Silent).unwrap();
-    let all = 2.0 * (16.0 * (D as f64).sqrt() + pair::CUTOFF * D_NOMINAL);
-    assert_eq!(editor.bins.near(&around, all).len(), settled.lattice().len());
     // a reach so long that it changes no temperature in single precision
     editor.relax(&around, 1e9, fields, &options, &mut Silent).unwrap();
     assert_eq!(editor.lattice().atoms(), settled.lattice().atoms());

@@ -42,7 +42,7 @@ pub enum FrameError {
         /// The coordinate found.
         value: f64,
     },
-    /// The direction's columns are not unit vectors at right angles.
+    /// The columns of a direction are not unit vectors at right angles.
     #[error("direction {direction:?} is not made of unit vectors at right angles")]
     Direction {
         /// The matrix found, row by row.

@@ -1,8 +1,7 @@
 //! The facet nearest to a point, and whether one passes near it along a feature.
 //!
-//! A tree of boxes over the facets, halved at the median along the longest axis: exact, and as fast
-//! where the mesh is graded as where it is not. Facets are segments in 2-D and triangles in 3-D, here
-//! simply the simplices of D corners.
+//! A tree of boxes over the facets, halved at the median along the longest axis: exact, and as fast for a graded mesh as
+//! for a uniform one. Facets are segments in 2-D and triangles in 3-D: the simplices of D corners.
 
 use super::faces::faces;
 use crate::geometry::linear::solve;
@@ -10,13 +9,13 @@ use crate::geometry::{Bounds, Point, difference, dot};
 use crate::mesh::Mesh;
 use rayon::prelude::*;
 
-/// Facets in a leaf, at most.
+/// The most facets of a leaf.
 const LEAF: usize = 4;
 
-/// Facets from which on the parts of a tree are made side by side.
+/// The least number of facets whose two halves are built in parallel.
 const PARALLEL: usize = 1 << 10;
 
-/// A box and the facets in it: those of its two parts, the first of which follows at once.
+/// A box and the facets in it: those of its two parts. The first part is the next node.
 #[derive(Clone)]
 struct Node<const D: usize> {
     bounds: Bounds<D>,
@@ -26,7 +25,7 @@ struct Node<const D: usize> {
     second: usize,
 }
 
-/// What "near it along a feature" means.
+/// The limits within which a facet follows a feature.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Near {
     /// The greatest distance.

@@ -118,5 +118,5 @@ pub(super) fn fidelity_of<const D: usize>(
     let grid = outcome.potential().grid();
     let frame = Frame::new(grid.shape).and_then(|frame| frame.with_spacing(grid.step));
     let frame = frame.expect("a grid's shape and step were a frame's");
-    Ok(fidelity(outcome.mesh(), (&frame, samples), watch)?)
+    Ok(fidelity(outcome.mesh(), &frame, samples, watch)?)
 }

@@ -1,27 +1,27 @@
 //! Taking points away where they crowd, and adding points where they are missing.
 //!
 //! An image pulls more atoms onto some features than edges of length d need, and leaves thin cells beside. A point
-//! goes if its star costs less with one of its near neighbours in its place; a long edge gets a point near its
-//! middle if the four cells around that cost less than the two had. Only what features or the floor
-//! have reached is looked at.
+//! goes if its star costs less with one of its near neighbours in its place. A long edge gets a point near its
+//! middle if the four cells around that cost less than the two had. Only points that features or the floor have
+//! woken are considered.
 
 use crate::fields::NominalDistance;
 use crate::geometry::{Point, distance_squared};
 
 use super::energy::Energy;
 use super::moves::Mover;
-use super::star::Star;
+use super::star::{Limits, Star};
 use super::swaps::LEAST_GAIN;
-use super::triangles::Triangles;
+use super::triangles::{CellPair, Triangles};
 
 /// A point may go to a neighbour that is nearer than this, over d.
 const SHORT: f64 = 0.8;
-/// An edge may be split that is longer than this, over d.
+/// The length from which on an edge may be split, over d.
 const LONG: f64 = 1.3;
 /// How far from the middle of an edge a guide may be to be a place for its new point, over d.
 const NEAR_MIDDLE: f64 = 0.3;
 
-/// Takes away what crowds. Returns how many points.
+/// Takes away points that crowd. Returns how many.
 pub(super) fn thin_out(triangles: &mut Triangles, energy: &Energy<'_>, mover: &mut Mover) -> usize {
     let (mut star, mut fan) = (Star::default(), Star::default());
     let mut removed = 0;
@@ -39,11 +39,11 @@ pub(super) fn thin_out(triangles: &mut Triangles, energy: &Energy<'_>, mover: &m
         let count = star.cells.len();
         let x = star.rim[to];
         fan_from(&star, &mut fan, to);
-        let cells = |place: usize| star.cells[(to + 1 + place) % count].0;
+        let cells = |place: usize| star.cells[(to + 1 + place) % count].cell;
         triangles.collapse(point, &star.cells, to);
         fan.share_out(triangles, energy, cells, x);
         mover.remove(point);
-        mover.wake_all(star.cells.iter().map(|cell| cell.1));
+        mover.wake_all(star.cells.iter().map(|cell| cell.first));
         removed += 1;
     }
     removed
@@ -57,14 +57,15 @@ fn best_end(star: &mut Star, fan: &mut Star, energy: &Energy<'_>, near: f64) -> 
     if ends.is_empty() {
         return None;
     }
-    let floor = star.least_sine().min(energy.sine_floor).max(1e-7);
+    let sine = energy.sine_to_keep(star.least_sine());
     let center = star.center;
-    let mut best = star.energy(energy, center, f64::INFINITY, f64::NEG_INFINITY)? - LEAST_GAIN;
+    let now = star.energy(energy, center, Limits::NONE)?;
+    let mut limits = Limits { energy: now - LEAST_GAIN, sine };
     let mut end = None;
     for to in ends {
         fan_from(star, fan, to);
-        if let Some(lower) = fan.energy(energy, star.rim[to], best, floor) {
-            best = lower;
+        if let Some(lower) = fan.energy(energy, star.rim[to], limits) {
+            limits.energy = lower;
             end = Some(to);
         }
     }
@@ -80,8 +81,8 @@ fn fan_from(star: &Star, fan: &mut Star, to: usize) {
     fan.measure_rim();
 }
 
-/// Adds what is missing. Returns how many points.
-pub(super) fn fill_up(
+/// Adds points where they are missing. Returns how many.
+pub(super) fn fill_gaps(
     triangles: &mut Triangles,
     energy: &Energy<'_>,
     mover: &mut Mover,
@@ -92,31 +93,14 @@ pub(super) fn fill_up(
     for cell in 0..triangles.len() as u32 {
         for place in 0..3 {
             let Some(pair) = triangles.pair(cell, place) else { continue };
-            let [a, b] = pair.edge.map(|c| triangles.points[c as usize]);
-            let middle: Point<2> = std::array::from_fn(|k| 0.5 * (a[k] + b[k]));
-            let d = distance.at(&middle);
-            let around = [pair.edge[0], pair.apices[1], pair.edge[1], pair.apices[0]];
-            let is_reached = around.iter().any(|&point| mover.is_reached(point));
-            if pair.cells[1] < cell || !is_reached || distance_squared(&a, &b) < (LONG * d).powi(2)
-            {
+            if pair.cells[1] < cell {
+                continue; // each pair once
+            }
+            let around = pair.corners();
+            if !around.iter().any(|&point| mover.has_been_awake(point)) {
                 continue;
             }
-            let corners = around.map(|c| triangles.points[c as usize]);
-            star.rim.clear();
-            star.rim.extend(corners.iter().chain(&corners[..1]));
-            star.measure_rim();
-            star.guides.clear();
-            let (mut old, mut floor) = (-LEAST_GAIN, energy.sine_floor);
-            for cell in pair.cells {
-                let guides = triangles.guides_in(cell);
-                let (cost, sine) = energy.of_cell(triangles.corners_at(cell), guides);
-                old += cost;
-                floor = floor.min(sine);
-                star.guides.extend_from_slice(guides);
-            }
-            let near = (NEAR_MIDDLE * d).powi(2);
-            let Some(x) = best_middle(&mut star, energy, middle, near, (old, floor.max(1e-7)))
-            else {
+            let Some(x) = place_for_a_point(triangles, energy, distance, &pair, &mut star) else {
                 continue;
             };
             let cells = triangles.split(&pair, x);
@@ -130,26 +114,58 @@ pub(super) fn fill_up(
     added
 }
 
+/// The place for a new point between a pair of cells, if their edge is long and that gains. `star` becomes the star
+/// that the point would have.
+fn place_for_a_point(
+    triangles: &Triangles,
+    energy: &Energy<'_>,
+    distance: &NominalDistance<2>,
+    pair: &CellPair,
+    star: &mut Star,
+) -> Option<Point<2>> {
+    let [a, b] = pair.edge.map(|c| triangles.points[c as usize]);
+    let middle: Point<2> = std::array::from_fn(|k| 0.5 * (a[k] + b[k]));
+    let d = distance.at(&middle);
+    if distance_squared(&a, &b) < (LONG * d).powi(2) {
+        return None;
+    }
+    let corners = pair.corners().map(|c| triangles.points[c as usize]);
+    star.rim.clear();
+    star.rim.extend(corners.iter().chain(&corners[..1]));
+    star.measure_rim();
+    star.guides.clear();
+    let (mut now, mut sine) = (-LEAST_GAIN, f64::INFINITY);
+    for cell in pair.cells {
+        let guides = triangles.guides_in(cell);
+        let old = energy.of_cell(triangles.corners_at(cell), guides);
+        now += old.cost;
+        sine = sine.min(old.sine);
+        star.guides.extend_from_slice(guides);
+    }
+    let limits = Limits { energy: now, sine: energy.sine_to_keep(sine) };
+    best_middle(star, energy, middle, (NEAR_MIDDLE * d).powi(2), limits)
+}
+
 /// The place within a rim of four corners that costs least: the middle of the edge, the mean of the corners, or a
-/// guide near the middle; `None` if none is below the limit and above the floor.
+/// guide nearer to the middle than the square root of `near`; `None` if none keeps to the limits.
 fn best_middle(
     star: &mut Star,
     energy: &Energy<'_>,
     middle: Point<2>,
     near: f64,
-    (mut limit, floor): (f64, f64),
+    mut limits: Limits,
 ) -> Option<Point<2>> {
     let mean: Point<2> =
         std::array::from_fn(|k| 0.25 * star.rim[..4].iter().map(|c| c[k]).sum::<f64>());
-    let guides = star.guides.iter().map(|&guide| energy.guides[guide as usize].position);
+    let guides = star.guides.iter().map(|&guide| energy.guides[guide as usize].at.position);
     let places: Vec<Point<2>> = [middle, mean]
         .into_iter()
         .chain(guides.filter(|p| distance_squared(p, &middle) < near))
         .collect();
     let mut best = None;
     for x in places {
-        if let Some(lower) = star.energy(energy, x, limit, floor) {
-            limit = lower;
+        if let Some(lower) = star.energy(energy, x, limits) {
+            limits.energy = lower;
             best = Some(x);
         }
     }

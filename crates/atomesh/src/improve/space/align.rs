@@ -149,7 +149,7 @@ impl<'a> Aligner<'a> {
         let around = ring.points[..ring.count].iter().chain(&ring.ends);
         around.for_each(|&p| contrast.include(self.depths[p as usize]));
         contrast.include(edge.depth);
-        let is_near = |p: &&u32| contrast.of(self.depths[**p as usize]) > NEAR;
+        let is_near = |p: &&u32| contrast.relative(self.depths[**p as usize]) > NEAR;
         if ring.points[..ring.count].iter().filter(is_near).count() < 3 {
             return false;
         }

@@ -3,6 +3,13 @@
 use crate::fields::ScalarField;
 use crate::geometry::{Point, cross, difference, dot};
 
+/// Where nothing is deeper than this there is no feature.
+pub(super) const LEAST_DEPTH: f64 = 0.2;
+/// A difference of less than this between the least and the greatest depth is noise.
+const LEAST_CONTRAST: f64 = 0.15;
+/// A difference of depths across a step that is less than this has no direction.
+const LEAST_SLOPE: f64 = 1e-3;
+
 /// The depth −b between samples, 0 where b repels. Linear along each axis, however the atoms read b: only the value
 /// is wanted, often.
 pub(super) struct DepthField<'a> {
@@ -74,7 +81,7 @@ impl<'a> DepthField<'a> {
         PLACES.iter().map(|w| self.depth(&between(facet, w))).sum::<f64>() / PLACES.len() as f64
     }
 
-    /// The mean depth along a facet. The depths that it is the mean of widen the contrast.
+    /// The mean depth along a facet, whose depths widen the contrast.
     #[inline(always)]
     pub fn mean_depth_within(&self, facet: &[Point<3>; 3], contrast: &mut Contrast) -> f64 {
         let depths = PLACES.map(|w| self.depth(&between(facet, &w)));
@@ -89,7 +96,7 @@ impl<'a> DepthField<'a> {
         worth(facet, self.mean_depth(facet), contrast)
     }
 
-    /// The move from a point straight down the slope to the valley's bottom, at most `reach` away.
+    /// The move from a point straight down the slope to the valley's bottom, if that is within about `reach`.
     pub fn shift_to_bottom(&self, p: &Point<3>, reach: f64) -> Option<Point<3>> {
         let h = 0.5 * self.step;
         let slope: Point<3> = std::array::from_fn(|k| {
@@ -131,19 +138,10 @@ pub(super) fn normal(facet: &[Point<3>; 3]) -> Point<3> {
 /// See [`DepthField::worth`].
 #[inline(always)]
 pub(super) fn worth(facet: &[Point<3>; 3], mean: f64, contrast: &Contrast) -> f64 {
-    let mean = contrast.of(mean);
+    let mean = contrast.relative(mean);
     let normal = normal(facet);
     0.5 * dot(&normal, &normal).sqrt() * (mean * mean).powi(2)
 }
-
-/// A difference of depths across a step that is less than this has no direction.
-const LEAST_SLOPE: f64 = 1e-3;
-
-/// Where nothing is deeper than this there is no feature.
-pub(super) const LEAST_DEPTH: f64 = 0.2;
-
-/// A difference of less than this between the least and the greatest depth is noise.
-const LEAST_CONTRAST: f64 = 0.15;
 
 /// The least and the greatest depth around a place. Relative to them, weak features count as much as strong ones
 /// elsewhere.
@@ -162,7 +160,7 @@ impl Contrast {
 
     /// A depth relative to the contrast: 0 at the least, 1 at the greatest.
     #[inline(always)]
-    pub fn of(&self, depth: f64) -> f64 {
+    pub fn relative(&self, depth: f64) -> f64 {
         ((depth - self.low) / (self.high - self.low).max(LEAST_CONTRAST)).max(0.0)
     }
 }

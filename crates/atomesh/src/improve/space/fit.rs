@@ -104,7 +104,7 @@ impl DepthField<'_> {
         contrast: &Contrast,
         fit: &mut MoveFit,
     ) {
-        let mean = contrast.of(mean);
+        let mean = contrast.relative(mean);
         let normal = normal(facet);
         let length = dot(&normal, &normal).sqrt();
         if mean < LEAST_MEAN || length == 0.0 {
@@ -118,7 +118,7 @@ impl DepthField<'_> {
             if profile.variance == 0.0 {
                 return; // the valley runs through the facet, not along it
             }
-            let weight = 0.5 * length * mean * mean * contrast.of(profile.depth);
+            let weight = 0.5 * length * mean * mean * contrast.relative(profile.depth);
             spread += weight * profile.variance;
             *equation = Equation { share: w[0], offset: profile.offset, weight };
         }
@@ -147,8 +147,8 @@ impl DepthField<'_> {
             }
         }
         // of a Gaussian, exp(2/σ²) with σ in steps
-        let ratio =
-            2.0 * contrast.of(depths[deepest]) / (contrast.of(depths[0]) + contrast.of(depths[4]));
+        let ratio = 2.0 * contrast.relative(depths[deepest])
+            / (contrast.relative(depths[0]) + contrast.relative(depths[4]));
         let variance = if ratio > LEAST_RATIO { 2.0 / ratio.min(GREATEST_RATIO).ln() } else { 0.0 };
         let step = self.step;
         Profile { offset: offset * step, depth: depths[deepest], variance: variance * step * step }

@@ -90,7 +90,9 @@ impl Aligner<'_> {
         if contrast.high < LEAST_DEPTH {
             return None;
         }
-        around.find_far_edges(tetrahedra, point, |p| contrast.of(self.depths[p as usize]) > NEAR);
+        around.find_far_edges(tetrahedra, point, |p| {
+            contrast.relative(self.depths[p as usize]) > NEAR
+        });
         if around.far_edges.len() < 2 {
             return None;
         }
@@ -102,7 +104,7 @@ impl Aligner<'_> {
         around.keep_deep(&contrast);
         let size = around.size_squared();
         let scale = Scale { area: 1.0 / size, contrast };
-        let mut total = OWN * contrast.of(self.depths[point as usize]).powi(2);
+        let mut total = OWN * contrast.relative(self.depths[point as usize]).powi(2);
         let mut fit = MoveFit::default();
         for (&[a, b], mean) in around.far_edges.iter().zip(&around.means) {
             let facet = [around.at, a, b];
@@ -144,7 +146,7 @@ impl Aligner<'_> {
             let facet = [*at, a, b];
             scale.area * self.field.worth(&facet, &scale.contrast)
         });
-        OWN * scale.contrast.of(self.field.depth(at)).powi(2) + facets.sum::<f64>()
+        OWN * scale.contrast.relative(self.field.depth(at)).powi(2) + facets.sum::<f64>()
     }
 }
 
@@ -213,7 +215,7 @@ impl Surroundings {
     fn keep_deep(&mut self, contrast: &Contrast) {
         let mut kept = 0;
         for n in 0..self.far_edges.len() {
-            if contrast.of(self.means[n]) > DEEP {
+            if contrast.relative(self.means[n]) > DEEP {
                 (self.far_edges[kept], self.means[kept]) = (self.far_edges[n], self.means[n]);
                 kept += 1;
             }

@@ -203,7 +203,7 @@ impl Aligner<'_> {
         points.iter().for_each(|&p| contrast.include(self.depths[p as usize]));
         for (freedom, &p) in small.freedom.iter_mut().zip(&points) {
             // what is in the valley stays
-            if contrast.of(self.depths[p as usize]) > NEAR {
+            if contrast.relative(self.depths[p as usize]) > NEAR {
                 *freedom = 0;
             }
         }
@@ -287,7 +287,7 @@ impl Aligner<'_> {
 
     /// A point in the valley so near that the stray may be left out for it.
     fn instead(&self, trial: &Trial) -> Option<Merge> {
-        let is_deep = |&c: &u32| trial.contrast.of(self.depth_of(trial, c)) > SHALLOW;
+        let is_deep = |&c: &u32| trial.contrast.relative(self.depth_of(trial, c)) > SHALLOW;
         let into = trial.nearest(is_deep, CROWDED)?;
         Some(Merge { into, at: trial.tetrahedra.points[into as usize] })
     }
