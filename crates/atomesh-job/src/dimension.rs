@@ -4,6 +4,7 @@ use atomesh::image::Image;
 use atomesh::run::Method;
 use atomesh_draw::Drawing;
 use atomesh_flow::FlowMethod;
+use atomesh_io::MeshFiles;
 use atomesh_io::image::AnyImage;
 
 /// How images of `D` axes are meshed, solved on and shown. What takes long to compile is compiled where it is
@@ -13,6 +14,8 @@ pub struct Dimension<const D: usize> {
     pub method: Method<D>,
     /// How flow on their meshes is computed.
     pub flow: FlowMethod<D>,
+    /// How files of theirs are written.
+    pub files: MeshFiles<D>,
     /// How they are drawn, in space by the three slices through the middle.
     pub drawing: Drawing<D>,
     /// The image if it has `D` axes.
@@ -29,6 +32,7 @@ impl Dimension<2> {
         Self {
             method: Method::plane(),
             flow: FlowMethod::plane(),
+            files: MeshFiles::plane(),
             drawing: Drawing::plane(),
             image: |any| match any {
                 AnyImage::Flat(image) => Some(image),
@@ -46,6 +50,7 @@ impl Dimension<3> {
         Self {
             method: Method::space(),
             flow: FlowMethod::space(),
+            files: MeshFiles::space(),
             drawing: Drawing::space(),
             image: |any| match any {
                 AnyImage::Volume(image) => Some(image),

@@ -7,7 +7,7 @@ use atomesh::image::{Image, Samples, Units};
 use atomesh::mesh::Mesh;
 use atomesh::watch::{Phase, check};
 use atomesh_draw::Style;
-use atomesh_io::image::{AnyImage, write_image};
+use atomesh_io::image::AnyImage;
 
 use crate::dimension::Dimension;
 use crate::error::JobError;
@@ -134,6 +134,6 @@ fn run<const D: usize>(
         session.writing(|_| file.write(&drawn))?;
     }
     check(session, Phase::Write, 0.0, None).map_err(|_| JobError::cancelled())?;
-    session.writing(|session| write_image(&request.output, &potential, session))?;
+    session.writing(|session| (dimension.files.image)(&request.output, &potential, session))?;
     Ok(EnhanceSummary { mixture, shape: potential.frame().shape().to_vec() })
 }

@@ -2,12 +2,13 @@
 
 use std::path::{Path, PathBuf};
 
-use atomesh_flow::{FlowError, FlowMethod, Problem};
+use atomesh_flow::{FlowError, Problem};
 use atomesh_io::mesh::cells::{
     AnyCells, CellData, CellReadError, ConnectionFiles, Flow, LoadedCells, ModflowFiles, Rock,
-    read_cells, write_connections_with_flow, write_modflow,
+    read_cells,
 };
 
+use crate::dimension::Dimension;
 use crate::error::JobError;
 use crate::files::{self, unknown_extension};
 use crate::permeability;
@@ -119,10 +120,10 @@ pub fn export_file(
             Err(JobError::misuse(message).about(&request.cells))
         }
         (AnyCells::Flat(cells), _) => {
-            Export { request, format: &format, cells: &cells }.write(&FlowMethod::plane(), session)
+            Export { request, format: &format, cells: &cells }.write(&Dimension::plane(), session)
         }
         (AnyCells::Volume(cells), _) => {
-            Export { request, format: &format, cells: &cells }.write(&FlowMethod::space(), session)
+            Export { request, format: &format, cells: &cells }.write(&Dimension::space(), session)
         }
     }
 }
@@ -149,10 +150,11 @@ struct Export<'a, const D: usize> {
 impl<const D: usize> Export<'_, D> {
     fn write(
         &self,
-        method: &FlowMethod<D>,
+        dimension: &Dimension<D>,
         session: &mut Session<'_>,
     ) -> Result<ExportSummary, JobError> {
         let LoadedCells { mesh, features, fields, frame, provenance } = self.cells;
+        let method = &dimension.flow;
         let grid = (method.grid_of_cells)(mesh, Some(features));
         let barriers = self.request.barrier.iter().map(|spec| spec.barrier().clone()).collect();
         let permeability = permeability::given(&self.request.permeability, fields)?;
@@ -169,12 +171,12 @@ impl<const D: usize> Export<'_, D> {
         let written = session.writing(|session| match self.format {
             ExportFormat::Connections(files) => {
                 let flow = Flow { permeability: &k, transmissibilities: &found };
-                write_connections_with_flow(files, &data, flow, session)
+                (dimension.files.connections_with_flow)(files, &data, flow, session)
             }
             ExportFormat::Disv(files) | ExportFormat::Disu(files) => {
                 let (top, thickness) = (self.request.top, self.request.thickness);
                 let rock = Rock { permeability: &k, multipliers, top, thickness };
-                write_modflow(files, &data, &rock, session)
+                (dimension.files.modflow)(files, &data, &rock, session)
             }
         });
         written.map_err(|e| JobError::from(e).about(&self.request.output))?;

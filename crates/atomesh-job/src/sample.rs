@@ -5,7 +5,7 @@ use std::str::FromStr;
 
 use atomesh::image::Image;
 use atomesh::sample::{SampleOptions, Statistic, sample as sample_cells};
-use atomesh_io::mesh::{AnyMesh, LoadedMesh, MeshData, MeshFormat, Values, write_mesh};
+use atomesh_io::mesh::{AnyMesh, LoadedMesh, MeshData, MeshFormat, Values};
 
 use crate::dimension::Dimension;
 use crate::error::JobError;
@@ -213,7 +213,7 @@ fn run<const D: usize>(
     let old = old.filter(|field| found.iter().all(|new| new.name != field.name));
     let mut all: Vec<Property> = old.map(|f| Property::exact(f.name, f.values)).collect();
     all.extend(found);
-    session.writing(|session| write(request, &loaded, &all, session))?;
+    session.writing(|session| write(request, &loaded, &all, dimension, session))?;
     let fields = all.into_iter().map(|property| property.name).collect();
     Ok(SampleSummary { cell_count: loaded.mesh.cell_count(), fields })
 }
@@ -223,6 +223,7 @@ fn write<const D: usize>(
     request: &SampleRequest,
     loaded: &LoadedMesh<D>,
     properties: &[Property],
+    dimension: &Dimension<D>,
     session: &mut Session<'_>,
 ) -> Result<(), JobError> {
     let mut data = MeshData::new(&loaded.mesh).with_tags(&loaded.tags);
@@ -238,6 +239,7 @@ fn write<const D: usize>(
     if let Some(provenance) = &loaded.provenance {
         data = data.with_provenance(provenance);
     }
-    write_mesh(&request.output, &data, session)
+    let format = MeshFormat::of(&request.output).map_err(JobError::misuse)?;
+    (dimension.files.mesh)(&request.output, format, &data, session)
         .map_err(|e| JobError::from(e).about(&request.output))
 }

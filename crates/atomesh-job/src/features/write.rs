@@ -4,11 +4,12 @@ use std::path::Path;
 
 use atomesh::features::FeatureSet;
 use atomesh::mesh::{Tags, is_feature_name};
-use atomesh_io::mesh::{LoadedMesh, MeshData, MeshFormat, write_mesh};
-use atomesh_io::surface::{SurfaceFormat, write_surface};
+use atomesh_io::mesh::{LoadedMesh, MeshData, MeshFormat};
+use atomesh_io::surface::SurfaceFormat;
 use serde_json::json;
 
 use super::FeaturesRequest;
+use crate::dimension::Dimension;
 use crate::error::JobError;
 use crate::files::{self, write_bytes};
 use crate::mesh_file;
@@ -39,9 +40,9 @@ impl<'a> FeatureFiles<'a> {
         if let Some(path) = &request.mesh_output
             && !MeshFormat::of(path).is_ok_and(MeshFormat::holds_tags)
         {
+            let known = MeshFormat::tag_endings();
             let message = format!(
-                "unknown extension of a mesh file that holds tags; expected one of {}",
-                MeshFormat::tag_endings()
+                "unknown extension of a mesh file that holds tags; expected one of {known}"
             );
             return Err(JobError::misuse(message).about(path));
         }
@@ -66,16 +67,22 @@ impl<'a> FeatureFiles<'a> {
         &self,
         loaded: &LoadedMesh<D>,
         found: &FeatureSet<D>,
+        dimension: &Dimension<D>,
         session: &mut Session<'_>,
     ) -> Result<(), JobError> {
         let mesh = &loaded.mesh;
         if let Some((path, _)) = self.surface {
             let means: Vec<f32> = found.features.iter().map(|f| f.mean as f32).collect();
-            let written = write_surface(path, mesh, &found.groups(), Some(&means), session);
+            let written =
+                (dimension.files.surface)(path, mesh, &found.groups(), Some(&means), session);
             written.map_err(|e| JobError::from(e).about(path))?;
         }
         if let Some(path) = &self.request.mesh_output {
-            write_tagged(path, loaded, &self.tags(loaded, found)?, session)?;
+            let tags = self.tags(loaded, found)?;
+            let data = tagged(loaded, &tags);
+            let format = MeshFormat::of(path).map_err(JobError::misuse)?;
+            let written = (dimension.files.mesh)(path, format, &data, session);
+            written.map_err(|e| JobError::from(e).about(path))?;
         }
         if let Some(path) = &self.request.json {
             let report = json!({
@@ -120,12 +127,8 @@ fn surface_format(path: &Path) -> Result<SurfaceFormat, JobError> {
     })
 }
 
-fn write_tagged<const D: usize>(
-    path: &Path,
-    loaded: &LoadedMesh<D>,
-    tags: &Tags<D>,
-    session: &mut Session<'_>,
-) -> Result<(), JobError> {
+/// The mesh with new tags and all else that it had.
+fn tagged<'a, const D: usize>(loaded: &'a LoadedMesh<D>, tags: &'a Tags<D>) -> MeshData<'a, D> {
     let mut data = MeshData::new(&loaded.mesh).with_tags(tags);
     for field in &loaded.point_fields {
         // a name that another program gave may not fit every format
@@ -138,5 +141,5 @@ fn write_tagged<const D: usize>(
     if let Some(provenance) = &loaded.provenance {
         data = data.with_provenance(provenance);
     }
-    write_mesh(path, &data, session).map_err(|e| JobError::from(e).about(path))
+    data
 }

@@ -7,13 +7,10 @@ use atomesh::image::Frame;
 use atomesh::watch::Phase;
 use atomesh_flow::Setting;
 use atomesh_flow::streamlines::{Porosity, Streamline, TraceOptions};
-use atomesh_io::atomic_file::AtomicFile;
 use atomesh_io::mesh::cells::CellData;
-use atomesh_io::mesh::cells::write_cells_vtu_with;
-use atomesh_io::mesh::vtu::write_broken_vtu;
 use atomesh_io::mesh::{
-    CellFields, FacetFlux, FluxFiles, FluxTable, MeshData, MeshDataError, MeshWriteError,
-    Provenance, Streamlines, write_fluxes, write_mesh, write_streamlines,
+    CellFields, FacetFlux, FluxFiles, FluxTable, MeshData, MeshDataError, MeshFormat, Provenance,
+    Streamlines,
 };
 
 use super::answer::FlowAnswer;
@@ -99,6 +96,7 @@ impl<'a, const D: usize> FlowWriting<'a, D> {
     /// Writes the mesh with what is known of its cells.
     fn write_output(&self, path: &Path, session: &mut Session<'_>) -> Result<(), JobError> {
         let FlowAnswer { mesh, grid, solution, velocities, .. } = self.answer;
+        let files = &self.dimension.files;
         let permeability = self.answer.permeabilities();
         let porosity = Porosity::Constant(self.answer.porosity);
         let time_of_flight = self.dimension.flow.time_of_flight;
@@ -115,7 +113,8 @@ impl<'a, const D: usize> FlowWriting<'a, D> {
             FlowMeshCells::Simplices { .. } => {
                 let Some(data) = self.mesh_data() else { return Ok(()) };
                 let data = fields.of_simplices(data).map_err(JobError::content)?;
-                write_mesh(path, &data, session)
+                let format = MeshFormat::of(path).map_err(JobError::misuse)?;
+                (files.mesh)(path, format, &data, session)
             }
             FlowMeshCells::Voronoi { cells, features } => {
                 let (Some(frame), Some(provenance)) = (&mesh.frame, &mesh.provenance) else {
@@ -124,7 +123,7 @@ impl<'a, const D: usize> FlowWriting<'a, D> {
                 };
                 let data = CellData { mesh: &**cells, features, frame, provenance };
                 let fields = fields.of_voronoi(cells.cell_count()).map_err(JobError::content)?;
-                write_voronoi(path, &data, &fields, session)
+                (files.cells_with)(path, &data, &fields, session)
             }
         };
         written.map_err(|e| JobError::from(e).about(path))
@@ -152,7 +151,7 @@ impl<'a, const D: usize> FlowWriting<'a, D> {
         let data = data.with_cell_vectors("velocity", &self.answer.velocities);
         let data = data.map_err(JobError::content)?;
         let at = |cell: usize, _: usize, place: &Point<D>| galerkin.pressure(cell, place);
-        let written = write_broken_vtu(path, &data, galerkin.order(), &at, session);
+        let written = (self.dimension.files.broken)(path, &data, galerkin.order(), &at, session);
         written.map_err(|e| JobError::from(e).about(path))
     }
 
@@ -174,7 +173,8 @@ impl<'a, const D: usize> FlowWriting<'a, D> {
             .collect();
         let (frame, provenance) = self.origin();
         let data = Streamlines { lines: &lines, frame, provenance };
-        write_streamlines(path, &data, session).map_err(|e| JobError::from(e).about(path))
+        let written = (self.dimension.files.streamlines)(path, &data, session);
+        written.map_err(|e| JobError::from(e).about(path))
     }
 
     fn write_facets(&self, files: &FluxFiles, session: &mut Session<'_>) -> Result<(), JobError> {
@@ -197,7 +197,8 @@ impl<'a, const D: usize> FlowWriting<'a, D> {
             .collect();
         let (frame, provenance) = self.origin();
         let table = FluxTable { facets: &facets, frame, provenance };
-        write_fluxes(files, &table, session).map_err(|e| JobError::from(e).about(&files.head))
+        let written = (self.dimension.files.fluxes)(files, &table, session);
+        written.map_err(|e| JobError::from(e).about(&files.head))
     }
 
     /// Where the mesh lies and comes from.
@@ -236,15 +237,4 @@ impl<'a, const D: usize> OutputFields<'a, D> {
             None => Ok(fields),
         }
     }
-}
-
-fn write_voronoi<const D: usize>(
-    path: &Path,
-    data: &CellData<'_, D>,
-    fields: &CellFields<'_, D>,
-    session: &mut Session<'_>,
-) -> Result<(), MeshWriteError> {
-    let mut file = AtomicFile::create(path)?;
-    write_cells_vtu_with(&mut file, data, fields, session)?;
-    Ok(file.commit()?)
 }

@@ -8,11 +8,8 @@ use atomesh::mesh::{Mesh, Regions, Tags};
 use atomesh::run::Outcome;
 use atomesh::watch::Phase;
 use atomesh_draw::Style;
-use atomesh_io::atomic_file::AtomicFile;
-use atomesh_io::image::write_image;
-use atomesh_io::mesh::cells::{CellData, foam_mesh_of, write_cells_vtu, write_connections};
-use atomesh_io::mesh::openfoam::write_foam_mesh;
-use atomesh_io::mesh::{MeshData, MeshFormat, MeshWriteError, Provenance, write_mesh_as};
+use atomesh_io::mesh::cells::CellData;
+use atomesh_io::mesh::{MeshData, MeshFormat, Provenance};
 
 use super::format::OutputFormat;
 use super::outputs::Outputs;
@@ -92,7 +89,7 @@ impl<const D: usize> Writing<'_, D> {
     fn write_potential(&self, path: &Path, session: &mut Session<'_>) -> Result<(), JobError> {
         let samples = Samples::F32(self.outcome.potential().samples().to_vec());
         let image = Image::new(*self.outcome.frame(), samples).map_err(JobError::content)?;
-        Ok(write_image(path, &image, session)?)
+        Ok((self.dimension.files.image)(path, &image, session)?)
     }
 
     fn write_simplices(
@@ -126,7 +123,7 @@ impl<const D: usize> Writing<'_, D> {
         if let Some(labels) = &labels {
             data = data.with_cell_field("label", labels).map_err(JobError::content)?;
         }
-        let written = write_mesh_as(&self.outputs.mesh, format, &data, session);
+        let written = (self.dimension.files.mesh)(&self.outputs.mesh, format, &data, session);
         written.map_err(|e| JobError::from(e).about(&self.outputs.mesh))?;
         Ok(tagged)
     }
@@ -170,29 +167,15 @@ impl<const D: usize> Writing<'_, D> {
         let features = features.unwrap_or_default();
         let frame = self.outcome.frame();
         let data = CellData { mesh: &mesh, features: &features, frame, provenance };
-        let written = if is_foam {
-            let mesh = foam_mesh_of(&data).map_err(JobError::content)?;
-            write_foam_mesh(path, &mesh, session)
-        } else {
-            write_vtu(path, &data, session)
-        };
-        written.map_err(|e| JobError::from(e).about(path))?;
-        if let Some(files) = &outputs.connections {
-            let written = write_connections(files, &data, session);
+        let files = &self.dimension.files;
+        let write = if is_foam { files.foam_cells } else { files.cells };
+        write(path, &data, session).map_err(|e| JobError::from(e).about(path))?;
+        if let Some(tables) = &outputs.connections {
+            let written = (files.connections)(tables, &data, session);
             written.map_err(|e| JobError::from(e).about(path))?;
         }
         Ok(())
     }
-}
-
-fn write_vtu<const D: usize>(
-    path: &Path,
-    data: &CellData<'_, D>,
-    session: &mut Session<'_>,
-) -> Result<(), MeshWriteError> {
-    let mut file = AtomicFile::create(path)?;
-    write_cells_vtu(&mut file, data, session)?;
-    Ok(file.commit()?)
 }
 
 /// The tags with regions beside them.

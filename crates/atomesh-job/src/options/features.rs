@@ -52,7 +52,7 @@ section! {
             value_parser = number_in(0.0, 1000.0, "a number of samples from 0 to 1000"))]
         pub normal_scale: f64,
         /// Least strength of features where connected to stronger parts (hysteresis), 0 to 1. Default: 0.3 for
-        /// ridges, 0.15 for horizons, 0.1 for faults, 0.2 for edge crests
+        /// ridges, 0.15 for horizons and faults, 0.2 for edge crests
         #[arg(long, value_name = "SHARE", value_parser = number_in(0.0, 1.0, "a number from 0 to 1"))]
         pub low: f64,
         /// Strength that each feature must reach somewhere (hysteresis), 0 to 1. Default: 0.4 for horizons, 0.5 for
@@ -96,7 +96,14 @@ impl PotentialOptions {
     /// The core's options: what is not given comes from `basis`.
     pub fn feature_options(&self, basis: FeatureOptions) -> FeatureOptions {
         let single = self.features.as_ref().and_then(|mixture| mixture.0.single());
-        let crests = self.crests();
+        let crests = CrestOptions {
+            polarity: self.polarity,
+            scale: self.scale,
+            normal_scale: self.normal_scale,
+            low: self.low,
+            high: self.high,
+            least_length: self.least_length,
+        };
         FeatureOptions {
             features: single.unwrap_or(basis.features),
             edge_operator: self.edge_operator.unwrap_or(basis.edge_operator),
@@ -115,18 +122,6 @@ impl PotentialOptions {
             },
             edges: CrestOptions { scale: self.edge_scale, ..crests }.or(basis.edges),
             ..basis
-        }
-    }
-
-    /// What is given for all kinds of crests.
-    fn crests(&self) -> CrestOptions {
-        CrestOptions {
-            polarity: self.polarity,
-            scale: self.scale,
-            normal_scale: self.normal_scale,
-            low: self.low,
-            high: self.high,
-            least_length: self.least_length,
         }
     }
 
