@@ -9,7 +9,7 @@ fuzz_target!(|bytes: &[u8]| {
     // the magic and its place are given, so that no time is spent on finding them
     let bytes = [&[0; 128][..], b"DICM", bytes].concat();
     let options = ReadOptions::default();
-    if let Ok(image) = decode_image(&bytes, ImageFormat::Dicom, &options, &mut Silent) {
+    if let Ok(image) = decode_image(&bytes, ImageFormat::DICOM, &options, &mut Silent) {
         assert_eq!(image.samples().len(), image.shape().iter().product::<usize>());
     }
 });

@@ -9,10 +9,10 @@ use libfuzzer_sys::fuzz_target;
 
 fuzz_target!(|bytes: &[u8]| {
     let options = ReadOptions::default();
-    let plain = decode_image(bytes, ImageFormat::Nifti, &options, &mut Silent);
+    let plain = decode_image(bytes, ImageFormat::NIFTI, &options, &mut Silent);
     let mut packed = flate2::write::GzEncoder::new(Vec::new(), flate2::Compression::fast());
     let packed = packed.write_all(bytes).and_then(|()| packed.finish()).unwrap();
-    let packed = decode_image(&packed, ImageFormat::NiftiGz, &options, &mut Silent);
+    let packed = decode_image(&packed, ImageFormat::NIFTI_GZ, &options, &mut Silent);
     match (plain, packed) {
         (Ok(a), Ok(b)) => {
             assert_eq!(a.samples().len(), a.shape().iter().product::<usize>());
@@ -24,5 +24,5 @@ fuzz_target!(|bytes: &[u8]| {
         (Err(_), Err(_)) => {}
     }
     // and as a gzip stream of its own
-    let _ = decode_image(bytes, ImageFormat::NiftiGz, &options, &mut Silent);
+    let _ = decode_image(bytes, ImageFormat::NIFTI_GZ, &options, &mut Silent);
 });

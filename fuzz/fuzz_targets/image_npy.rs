@@ -8,7 +8,7 @@ use libfuzzer_sys::fuzz_target;
 fuzz_target!(|bytes: &[u8]| {
     // the magic is given, so that no time is spent on finding it
     let bytes = [b"\x93NUMPY", bytes].concat();
-    if let Ok(image) = decode_image(&bytes, ImageFormat::Npy, &ReadOptions::default(), &mut Silent)
+    if let Ok(image) = decode_image(&bytes, ImageFormat::NPY, &ReadOptions::default(), &mut Silent)
     {
         assert_eq!(image.samples().len(), image.shape().iter().product::<usize>());
     }

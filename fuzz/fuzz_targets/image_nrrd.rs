@@ -9,7 +9,7 @@ fuzz_target!(|bytes: &[u8]| {
     // the magic is given, so that no time is spent on finding it
     let bytes = [&b"NRRD000"[..], bytes].concat();
     let options = ReadOptions::default();
-    if let Ok(image) = decode_image(&bytes, ImageFormat::Nrrd, &options, &mut Silent) {
+    if let Ok(image) = decode_image(&bytes, ImageFormat::NRRD, &options, &mut Silent) {
         assert_eq!(image.samples().len(), image.shape().iter().product::<usize>());
     }
 });

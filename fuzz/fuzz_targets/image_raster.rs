@@ -6,7 +6,7 @@ use atomesh_io::image::{ImageFormat, ReadOptions, decode_image};
 use libfuzzer_sys::fuzz_target;
 
 fuzz_target!(|bytes: &[u8]| {
-    for format in [ImageFormat::Png, ImageFormat::Jpeg, ImageFormat::Pnm] {
+    for format in [ImageFormat::PNG, ImageFormat::JPEG, ImageFormat::PNM] {
         if let Ok(image) = decode_image(bytes, format, &ReadOptions::default(), &mut Silent) {
             assert_eq!(image.samples().len(), image.shape().iter().product::<usize>());
         }

@@ -14,7 +14,7 @@ fuzz_target!(|input: (u8, bool, u8, Vec<u64>, &[u8])| {
         offset: offset.into(),
     };
     let options = ReadOptions { raw: Some(layout), ..ReadOptions::default() };
-    if let Ok(image) = decode_image(bytes, ImageFormat::Raw, &options, &mut Silent) {
+    if let Ok(image) = decode_image(bytes, ImageFormat::RAW, &options, &mut Silent) {
         assert_eq!(image.samples().len(), image.shape().iter().product::<usize>());
     }
 });

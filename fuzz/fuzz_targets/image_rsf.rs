@@ -7,7 +7,7 @@ use libfuzzer_sys::fuzz_target;
 
 fuzz_target!(|bytes: &[u8]| {
     let options = ReadOptions::default();
-    if let Ok(image) = decode_image(bytes, ImageFormat::Rsf, &options, &mut Silent) {
+    if let Ok(image) = decode_image(bytes, ImageFormat::RSF, &options, &mut Silent) {
         assert_eq!(image.samples().len(), image.shape().iter().product::<usize>());
     }
 });

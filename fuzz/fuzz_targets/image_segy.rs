@@ -16,7 +16,7 @@ fuzz_target!(|input: (Option<[u8; 2]>, Option<[u8; 2]>, bool, &[u8])| {
     let mut bytes = vec![b' '; 3200];
     bytes.extend(behind);
     let options = ReadOptions { segy, ..ReadOptions::default() };
-    if let Ok(image) = decode_image(&bytes, ImageFormat::Segy, &options, &mut Silent) {
+    if let Ok(image) = decode_image(&bytes, ImageFormat::SEGY, &options, &mut Silent) {
         assert_eq!(image.samples().len(), image.shape().iter().product::<usize>());
     }
 });

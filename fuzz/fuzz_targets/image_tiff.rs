@@ -6,7 +6,7 @@ use atomesh_io::image::{ImageFormat, ReadOptions, decode_image};
 use libfuzzer_sys::fuzz_target;
 
 fuzz_target!(|bytes: &[u8]| {
-    if let Ok(image) = decode_image(bytes, ImageFormat::Tiff, &ReadOptions::default(), &mut Silent)
+    if let Ok(image) = decode_image(bytes, ImageFormat::TIFF, &ReadOptions::default(), &mut Silent)
     {
         assert_eq!(image.samples().len(), image.shape().iter().product::<usize>());
     }

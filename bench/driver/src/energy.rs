@@ -3,8 +3,7 @@
 use std::f64::consts::SQRT_2;
 
 use atomesh::energy::{Engine, PairsEngine, SampledEngine};
-use atomesh::fields::NominalDistance;
-use atomesh::fields::{ImageWeight, Interpolation, ScalarField};
+use atomesh::fields::{FieldsView, ImageWeight, Interpolation, NominalDistance, ScalarField};
 use atomesh::geometry::{Point, compact_order};
 use atomesh::image::Grid;
 use atomesh::lattice::{Crystal, GrowOptions, grow};
@@ -57,7 +56,7 @@ struct Scenery {
     potential: ScalarField<3>,
     weight: ImageWeight<3>,
     distance: NominalDistance<3>,
-    /// In a compact order, as the pipeline has them.
+    /// In a compact order, as a run has them.
     atoms: Vec<Point<3>>,
 }
 
@@ -68,11 +67,10 @@ impl Energy {
             Scene::Image => image()?,
             Scene::Crystal => crystal(self.side)?,
         };
+        let fields = FieldsView { potential: &potential, weight: &weight, distance: &distance };
         match self.engine {
-            Engines::Sampled => {
-                self.evaluate(SampledEngine::new(&potential, &weight, &distance), &atoms)
-            }
-            _ => self.evaluate(PairsEngine::new(&potential, &weight, &distance), &atoms),
+            Engines::Sampled => self.evaluate(SampledEngine::new(fields), &atoms),
+            _ => self.evaluate(PairsEngine::new(fields), &atoms),
         }
     }
 

@@ -1,9 +1,9 @@
-//! Colours for numbers: lightness rises evenly from the least to the greatest, so that the order shows in
-//! grey too and to those who see fewer colours.
+//! Colours for numbers. Lightness rises evenly from the least to the greatest, so that the order also shows in
+//! grey and to colour-blind readers.
 
-use crate::Color;
+use crate::style::Color;
 
-/// The colours that a map is cut into, so that shapes of one colour can be drawn together.
+/// The number of colours of a map: shapes of one colour are drawn together.
 pub(crate) const LEVELS: usize = 64;
 
 /// Colours from the least to the greatest number, evenly spaced.
@@ -37,7 +37,7 @@ pub(crate) const PLASMA: ColorMap = ColorMap(&[
 ]);
 
 impl ColorMap {
-    /// The colour at a share of the way from the least to the greatest; at the nearer end beyond them.
+    /// The colour at a share of the way from the least to the greatest number, clamped to 0…1.
     pub fn at(self, share: f64) -> Color {
         let Self(stops) = self;
         let place = share.clamp(0.0, 1.0) * (stops.len() - 1) as f64;
@@ -58,8 +58,8 @@ pub(crate) struct Range {
 }
 
 impl Range {
-    /// From the number that the share `cut` of the finite numbers lies below to the one that as many lie above;
-    /// `None` without finite numbers.
+    /// The range of the finite numbers without the shares `cut` at its lower and its upper end; `None` without finite
+    /// numbers.
     pub fn robust(numbers: impl Iterator<Item = f64>, cut: [f64; 2]) -> Option<Self> {
         let mut finite: Vec<f64> = numbers.filter(|x| x.is_finite()).collect();
         finite.sort_unstable_by(f64::total_cmp);
@@ -68,13 +68,13 @@ impl Range {
         Some(Self { low: at(cut[0]), high: at(1.0 - cut[1]) })
     }
 
-    /// Where a number lies between the ends, 0 to 1; the middle if all are equal.
+    /// Where a number lies between the ends, 0 to 1; 1/2 if these are equal.
     pub fn share(self, number: f64) -> f64 {
         if self.high > self.low { (number - self.low) / (self.high - self.low) } else { 0.5 }
     }
 
-    /// Things in groups by the level of their number, lowest first, each group with its colour. What is no
-    /// number is left out.
+    /// Things in groups by the level of their number, lowest first, each group with its colour. Things whose number is not
+    /// finite are left out.
     pub fn grouped<T>(
         self,
         map: ColorMap,

@@ -7,7 +7,7 @@ use std::path::PathBuf;
 #[non_exhaustive]
 pub enum DrawError {
     /// A file's name does not say which kind of picture it is.
-    #[error("{path:?} is no picture by its name; expected .png or .svg")]
+    #[error("{path:?} is not the name of a picture; expected .png or .svg")]
     Format {
         /// The name.
         path: PathBuf,
@@ -22,17 +22,17 @@ pub enum DrawError {
         /// The samples along the axis.
         count: usize,
     },
-    /// There is not one of something for each of what they are for.
+    /// The number of values is not that of the cells or points that they belong to.
     #[error("{found} {what}; expected none or {expected}")]
     Count {
-        /// What there is.
+        /// The values, as "velocities".
         what: &'static str,
         /// How many there are.
         found: usize,
         /// How many there should be.
         expected: usize,
     },
-    /// A barrier is no facet of the mesh.
+    /// A barrier is not a facet of the mesh.
     #[error("barrier {facet}; the mesh has {count} facets")]
     Facet {
         /// Its number.
@@ -40,10 +40,10 @@ pub enum DrawError {
         /// How many facets there are.
         count: usize,
     },
-    /// A length or brightness of the style has no meaning.
+    /// A number of a style is out of range.
     #[error("{name} is {value}; expected a finite number above 0{}", limit.map_or(String::new(), |l| format!(" and up to {l}")))]
     Style {
-        /// The field of [`Style`](crate::Style).
+        /// The field of [`Style`](crate::Style) or [`FlowStyle`](crate::FlowStyle).
         name: &'static str,
         /// Its value.
         value: f64,

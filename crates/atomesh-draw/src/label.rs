@@ -1,6 +1,6 @@
-//! The few letters that name slices and colours, and digits, as strokes: no font is needed, and PNG and SVG agree.
+//! The letters that name slices and colours, and digits, as strokes: no font is needed, and PNG and SVG agree.
 
-use crate::picture::{Place, Rect, Shape};
+use crate::shape::{Place, Rect, Shape};
 
 /// The height of a letter in pixels; its width is 0.7 of it.
 const HEIGHT: f64 = 13.0;
@@ -49,7 +49,7 @@ fn strokes(letter: char) -> &'static [[Place; 2]] {
     }
 }
 
-/// The strokes of letters of a height, narrower than those of labels, from an upper left corner on.
+/// The strokes of a text of a height, narrower than in labels, from its upper left corner on.
 pub(crate) fn lettering(text: &str, corner: Place, height: f64) -> Vec<[Place; 2]> {
     let (width, advance) = (0.5 * height, 0.82 * height);
     let of = |(i, letter): (usize, char)| {
@@ -61,7 +61,7 @@ pub(crate) fn lettering(text: &str, corner: Place, height: f64) -> Vec<[Place; 2
     text.chars().enumerate().flat_map(of).collect()
 }
 
-/// A white box with black letters (X, Y, Z, -) in the upper right corner of `panel`.
+/// A white box with a text in black in the upper right corner of `panel`.
 pub(crate) fn label(text: &str, panel: &Rect) -> [Shape; 2] {
     let size = [text.len() as f64 * ADVANCE - 4.0 + 2.0 * MARGIN, HEIGHT + 2.0 * MARGIN];
     let corner = [panel.corner[0] + panel.size[0] - size[0], panel.corner[1]];

@@ -1,14 +1,15 @@
-//! What colours stand for: a bar beside a picture, with its name and the numbers at its ends and middle.
+//! The legend: beside a picture, a bar of colours with its name and the numbers at its ends and middle.
 
 use crate::color_map::{ColorMap, LEVELS, Range};
 use crate::label::lettering;
-use crate::picture::{Picture, Place, Rect, Shape};
+use crate::picture::Picture;
+use crate::shape::{Place, Rect, Shape};
 
-/// The width in pixels that is added for bars, and the blank around them.
+/// The width in pixels that bars add to a picture, and the blank around them.
 const STRIP: u32 = 104;
 const MARGIN: f64 = 10.0;
 
-/// The width of a bar, its greatest height, and the height of a picture that each needs at least.
+/// The width of a bar, its greatest height, and the least height of a picture per bar.
 const WIDTH: f64 = 14.0;
 const TALLEST: f64 = 180.0;
 const LEAST: u32 = 120;
@@ -17,15 +18,15 @@ const LEAST: u32 = 120;
 const LETTER: f64 = 9.0;
 const STROKE: f64 = 1.3;
 
-/// What a bar is of.
+/// A bar of the colours of a range.
 pub(crate) struct Bar {
-    /// In capitals that [`lettering`] knows.
+    /// Its name, in capitals that [`lettering`] knows.
     pub name: &'static str,
     pub map: ColorMap,
     pub range: Range,
 }
 
-/// Puts bars to the right of a picture, which becomes wider, and as high as they need; nothing without bars.
+/// Puts bars to the right of a picture, which becomes wider, and as high as they need. Without bars it stays as it is.
 pub(crate) fn put_beside(picture: &mut Picture, bars: &[Bar]) {
     if bars.is_empty() {
         return;
@@ -47,7 +48,7 @@ fn shapes(bar: &Bar, rect: Rect) -> Vec<Shape> {
     let slab = |i: usize| {
         let corner = [x, y + rect.size[1] - (i + 1) as f64 * level];
         let color = bar.map.at((i as f64 + 0.5) / LEVELS as f64);
-        // into the one below, by half, so that no seam shows; the lowest stays within the bar
+        // overlaps half of the one below, so that no seam shows; the lowest stays within the bar
         let height = if i == 0 { level } else { 1.5 * level };
         Shape::Fill { rect: Rect { corner, size: [WIDTH, height] }, color }
     };
@@ -63,7 +64,7 @@ fn shapes(bar: &Bar, rect: Rect) -> Vec<Shape> {
     shapes
 }
 
-/// A number with three digits that count.
+/// A number with three significant digits.
 fn short(number: f64) -> String {
     let digits = format!("{number:.2e}");
     let exponent: i32 =

@@ -1,36 +1,43 @@
-//! Pictures of meshes over images: PNG by a small rasteriser, SVG by hand, no fonts.
+//! Pictures of meshes over images, as PNG and SVG, without fonts.
 //!
-//! [`draw_flat`] lays a triangular mesh over its image, as in figure 2 of Hale (2001), or atoms over a
+//! [`draw_triangles`] lays a triangular mesh over its image, as in figure 2 of Hale (2001), or atoms over a
 //! field, as in his figure 5; [`draw_slices`] lays the cuts of a tetrahedral mesh over the three
 //! orthogonal slices of its image, as in his figure 9; [`draw_polygons`] and [`draw_polyhedra`] do the same for
-//! Voronoi cells. [`draw_flow`] and [`draw_flow_slices`] show what flows on either. All return a [`Picture`], a list of what to draw and where, which becomes PNG or SVG;
-//! [`ReportPage`] is a report with its pictures as one HTML file. The same input gives the same bytes.
+//! Voronoi cells. [`draw_flow`] and [`draw_flow_slices`] show what flows on either. [`Drawing`] holds them for callers
+//! that are generic over the dimension. All return a [`Picture`], a list of what to draw and where, which becomes PNG
+//! or SVG; [`ReportPage`] is a report with its pictures as one HTML file. The same input gives the same bytes.
 //!
 //! Meshes are given in *sample coordinates*: lattice coordinates divided by the grid's step. Row 0 is
-//! on top, x grows to the right. A sample covers the square around its centre, so a picture reaches
+//! at the top, x grows to the right. A sample covers the square around its centre, so a picture reaches
 //! half a sample beyond the mesh.
 
 mod color_map;
+mod cut;
+mod drawing;
 mod error;
-mod flat;
 mod flow;
 mod label;
 mod legend;
 mod page;
+mod panel;
 mod picture;
+mod plane;
 mod png_encode;
 mod raster;
+mod scale;
+mod shape;
 mod slices;
 mod style;
 mod svg;
 mod view;
 
+pub use drawing::Drawing;
 pub use error::DrawError;
-pub use flat::{draw_flat, draw_polygons};
 pub use flow::{
     FlowCells, FlowLine, FlowPicture, FlowStyle, FlowWell, draw_flow, draw_flow_slices,
 };
 pub use page::ReportPage;
 pub use picture::{Picture, PictureFormat};
+pub use plane::{draw_polygons, draw_triangles};
 pub use slices::{draw_polyhedra, draw_slices};
 pub use style::{Color, Style};

@@ -1,46 +1,10 @@
-//! A picture: what is drawn where, in pixels, x to the right and y down.
+//! A picture: a size, and shapes in pixels.
 
 use std::path::Path;
 
-use crate::raster::Raster;
-use crate::{Color, DrawError, png_encode, svg};
-
-/// A place in a picture, in pixels from its upper left corner.
-pub(crate) type Place = [f64; 2];
-
-/// A rectangle: its upper left corner and its size.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub(crate) struct Rect {
-    pub corner: Place,
-    pub size: Place,
-}
-
-/// Something to draw; later shapes cover earlier ones.
-#[derive(Clone, Debug)]
-pub(crate) enum Shape {
-    /// Greys stretched over a parallelogram, each sample a parallelogram of one grey: sample 0 is at
-    /// `corner`, and `right` and `down` are the sides along a row and a column.
-    Image { raster: Raster, corner: Place, right: Place, down: Place },
-    /// A filled rectangle.
-    Fill { rect: Rect, color: Color },
-    /// Straight lines, round at their ends.
-    Lines { lines: Vec<[Place; 2]>, width: f64, color: Color },
-    /// Filled discs of one radius.
-    Discs { centers: Vec<Place>, radius: f64, color: Color },
-    /// Filled squares of one half side.
-    Squares { centers: Vec<Place>, half: f64, color: Color },
-    /// Filled polygons of one colour; not `smooth`, they have no half-covered pixels, so that neighbours
-    /// leave no seam.
-    Polygons { polygons: Vec<Vec<Place>>, color: Color, smooth: bool },
-}
-
-impl Shape {
-    /// Greys stretched over a rectangle.
-    pub fn upright(raster: Raster, rect: Rect) -> Self {
-        let ([width, height], corner) = (rect.size, rect.corner);
-        Self::Image { raster, corner, right: [width, 0.0], down: [0.0, height] }
-    }
-}
+use crate::error::DrawError;
+use crate::shape::{Place, Shape};
+use crate::{png_encode, svg};
 
 /// The kinds of picture files.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
@@ -52,7 +16,7 @@ pub enum PictureFormat {
 }
 
 impl PictureFormat {
-    /// The kind that a file's name calls for by its extension, in any case.
+    /// The kind of a file by its extension, in upper or lower case.
     ///
     /// # Errors
     /// [`DrawError::Format`] unless the extension is png or svg.
@@ -91,7 +55,7 @@ impl Picture {
         self.height
     }
 
-    /// How many lines, dots and the like there are: what decides how large it is as SVG.
+    /// The number of lines, dots and other parts, which decides how large it is as SVG.
     pub(crate) fn shape_count(&self) -> usize {
         let count = |shape: &Shape| match shape {
             Shape::Image { .. } | Shape::Fill { .. } => 1,
@@ -108,8 +72,8 @@ impl Picture {
     /// [`DrawError::Png`] if the PNG encoder fails, as it may for lack of memory.
     pub fn encode(&self, format: PictureFormat) -> Result<Vec<u8>, DrawError> {
         match format {
-            PictureFormat::Png => png_encode::encode(self),
-            PictureFormat::Svg => svg::encode(self),
+            PictureFormat::Png => png_encode::encode([self.width, self.height], &self.shapes),
+            PictureFormat::Svg => svg::encode([self.width, self.height], &self.shapes),
         }
     }
 }

@@ -2,21 +2,21 @@
 
 use tiny_skia::{FillRule, LineCap, Paint, PathBuilder, Pixmap, Stroke, Transform};
 
-use crate::picture::{Picture, Place, Shape};
+use crate::error::DrawError;
 use crate::raster::Raster;
-use crate::{Color, DrawError};
+use crate::shape::{Place, Shape};
+use crate::style::Color;
 
-/// Lines in one path: the rasteriser sorts a path's edges, so short paths are faster.
+/// Lines per path: the rasteriser sorts a path's edges, so short paths are faster.
 const LINES_PER_PATH: usize = 2048;
 
-/// The picture as an RGB PNG.
-pub(crate) fn encode(picture: &Picture) -> Result<Vec<u8>, DrawError> {
-    let (width, height) = (picture.width, picture.height);
+/// A picture of that width and height as an RGB PNG.
+pub(crate) fn encode([width, height]: [u32; 2], shapes: &[Shape]) -> Result<Vec<u8>, DrawError> {
     let mut pixmap = Pixmap::new(width, height).ok_or_else(|| DrawError::Png {
         reason: format!("{width} × {height} pixels are too many"),
     })?;
     pixmap.fill(tiny_skia::Color::WHITE);
-    for shape in &picture.shapes {
+    for shape in shapes {
         draw(&mut pixmap, shape);
     }
     let rgb: Vec<u8> =
@@ -153,7 +153,7 @@ fn image(pixmap: &mut Pixmap, raster: &Raster, corner: Place, [right, down]: [Pl
     }
 }
 
-/// Which of `count` samples lies at that share of their side.
+/// The number of the sample at a share of the side; `None` outside 0…1.
 fn sample(share: f64, count: usize) -> Option<usize> {
     (0.0..1.0).contains(&share).then(|| ((share * count as f64) as usize).min(count - 1))
 }

@@ -2,11 +2,11 @@
 
 use atomesh::image::Samples;
 
-/// The share of samples that may be cut off at either end of the range of greys.
+/// The share of samples beyond each end of the range of greys.
 const CUT: f64 = 0.005;
 
-/// The most samples looked at to find the range.
-const LOOKS: usize = 1 << 16;
+/// The most samples from which the range is found.
+const RANGE_SAMPLES: usize = 1 << 16;
 
 /// Greys on a grid of `columns` × `rows`, row 0 on top.
 #[derive(Clone, Debug, PartialEq)]
@@ -25,12 +25,12 @@ pub(crate) struct Ramp {
 }
 
 impl Ramp {
-    /// From black at the 0.5th percentile of the finite samples to `brightness` at the 99.5th; of a
-    /// sparse image, whose percentiles fall together, from the least to the greatest.
+    /// From black at the 0.5th percentile of the finite samples to `brightness` at the 99.5th; from the least to the
+    /// greatest sample if the two are equal, as in sparse images.
     pub fn robust(samples: &Samples, brightness: f64) -> Self {
-        let stride = samples.len().div_ceil(LOOKS).max(1);
-        let looks = (0..samples.len()).step_by(stride).map(|i| samples.get(i));
-        let mut seen: Vec<f64> = looks.filter(|s| s.is_finite()).collect();
+        let stride = samples.len().div_ceil(RANGE_SAMPLES).max(1);
+        let chosen = (0..samples.len()).step_by(stride).map(|i| samples.get(i));
+        let mut seen: Vec<f64> = chosen.filter(|s| s.is_finite()).collect();
         seen.sort_unstable_by(f64::total_cmp);
         let cut = (seen.len() as f64 * CUT) as usize;
         let (mut low, mut high) = match seen.len() {
@@ -44,7 +44,7 @@ impl Ramp {
         Self { low, high, brightest: 255.0 * brightness }
     }
 
-    /// The grey of a sample; black if it is not a number, a middle grey if all samples are equal.
+    /// The grey of a sample; black for NaN, a middle grey if all samples are equal.
     pub fn grey(&self, sample: f64) -> u8 {
         let share =
             if self.high > self.low { (sample - self.low) / (self.high - self.low) } else { 0.5 };

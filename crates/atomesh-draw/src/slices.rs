@@ -1,50 +1,31 @@
-//! The three orthogonal slices of a tetrahedral mesh over its image.
+//! The three orthogonal slices of tetrahedra or polyhedra over their image.
 
 use atomesh::geometry::Point;
 use atomesh::image::Image;
 use atomesh::mesh::{Mesh, PolyMesh};
 
-use crate::flat::{LOOKS, median, scale, typical_length};
+use crate::cut::{Level, unique};
+use crate::error::DrawError;
 use crate::label::label;
-use crate::picture::{Picture, Place, Rect, Shape};
+use crate::panel::{GAP, Panel};
+use crate::picture::Picture;
 use crate::raster::Ramp;
+use crate::scale::{EDGE_SAMPLES, median, scale, typical_length};
+use crate::shape::{Place, Rect, Shape};
+use crate::style::Style;
 use crate::view::view;
-use crate::{DrawError, Style};
-
-/// Pixels between panels.
-pub(crate) const GAP: f64 = 4.0;
 
 /// Half the side of an atom's square, in widths of an edge.
 const ATOM_HALF: f64 = 2.0;
 
-/// The colour of the lines where the other slices pass.
-pub(crate) const CROSS_HAIR: [u8; 3] = [230, 0, 0];
-
-/// A slice: its name, the axis it is normal to, and the axes drawn to the right and down.
-pub(crate) struct Plane {
-    pub name: &'static str,
-    pub normal: usize,
-    pub right: usize,
-    pub down: usize,
-}
-
-/// The slices in the paper's places: X-Y upper right, Y-Z lower left, X-Z lower right, so that x is
-/// shared by the right panels and z by the lower ones.
-pub(crate) const PLANES: [(Plane, [usize; 2]); 3] = [
-    (Plane { name: "X-Y", normal: 2, right: 0, down: 1 }, [1, 0]),
-    (Plane { name: "Y-Z", normal: 0, right: 1, down: 2 }, [0, 1]),
-    (Plane { name: "X-Z", normal: 1, right: 0, down: 2 }, [1, 1]),
-];
-
 /// Draws the slices through sample `at` of an image with the cuts of the mesh's faces, as in figure 9
-/// of Hale (2001), beside a view of the slices in space; red lines show where the other slices pass. With [`Style::atoms`], atoms within one
-/// sample of a slice are drawn as squares.
+/// of Hale (2001), beside a view of the slices in space. Red lines show where the other slices are.
+/// With [`Style::atoms`], atoms within one sample of a slice are drawn as squares.
 ///
 /// The mesh is in sample coordinates. Cost: O(pixels + samples of the slices + cells).
 ///
 /// # Errors
-/// [`DrawError::Slice`] if `at` is outside the image, [`DrawError::Style`] if a number of the style has
-/// no meaning.
+/// [`DrawError::Slice`] if `at` is outside the image, [`DrawError::Style`] if a number of the style is out of range.
 pub fn draw_slices(
     image: &Image<3>,
     mesh: &Mesh<3>,
@@ -85,18 +66,15 @@ fn draw(
     let sides: Point<3> = std::array::from_fn(|k| shape[k] as f64 * step[k]);
     let extent = [sides[1] + sides[0], sides[1] + sides[2]];
     let scale = scale(mesh.edge(&step), &extent, style);
-    let scene = Scene { image, mesh, at, style, pixels: step.map(|s| s * scale) };
+    let scene = Scene { image, mesh, at, style };
     let ramp = Ramp::robust(image.samples(), style.brightness);
 
     let mut picture = Picture::new(extent.map(|e| e * scale + GAP));
-    let corner = Rect { corner: [0.0; 2], size: [sides[1] * scale; 2] };
+    let sides = sides.map(|side| side * scale);
+    let corner = Rect { corner: [0.0; 2], size: [sides[1]; 2] };
     picture.shapes.extend(view(image, at, style, corner));
-    for (plane, [column, row]) in &PLANES {
-        let corner =
-            [*column as f64 * (sides[1] * scale + GAP), *row as f64 * (sides[1] * scale + GAP)];
-        let size = [plane.right, plane.down].map(|k| sides[k] * scale);
-        let panel = Panel { scene: &scene, plane, rect: Rect { corner, size } };
-        picture.shapes.extend(panel.shapes(&ramp));
+    for panel in Panel::all([-0.5; 3], sides, step.map(|s| s * scale), style.z_up) {
+        picture.shapes.extend(scene.shapes(&panel, &ramp));
     }
     Ok(picture)
 }
@@ -107,133 +85,48 @@ struct Scene<'a> {
     mesh: &'a dyn Sliced,
     at: [usize; 3],
     style: &'a Style,
-    /// Pixels to a sample along each axis.
-    pixels: [f64; 3],
 }
 
-/// One slice in its place.
-struct Panel<'a> {
-    scene: &'a Scene<'a>,
-    plane: &'a Plane,
-    rect: Rect,
-}
-
-impl Panel<'_> {
-    fn shapes(&self, ramp: &Ramp) -> Vec<Shape> {
-        let (style, plane, rect) = (self.scene.style, self.plane, self.rect);
-        let mut shapes = vec![self.background(ramp)];
+impl Scene<'_> {
+    fn shapes(&self, panel: &Panel, ramp: &Ramp) -> Vec<Shape> {
+        let style = self.style;
+        let mut shapes = vec![panel.image(self.image, self.at, style.units, ramp)];
         if style.edges {
             let (width, color) = (style.edge_width, style.edge_color);
-            shapes.push(Shape::Lines { lines: self.cuts(), width, color });
+            shapes.push(Shape::Lines { lines: self.cuts(panel), width, color });
         }
         if style.atoms {
             let (half, color) = (ATOM_HALF * style.edge_width, style.atom_color);
-            shapes.push(Shape::Squares { centers: self.atoms(), half, color });
+            shapes.push(Shape::Squares { centers: self.atoms(panel), half, color });
         }
-        let cross = self.place(&self.scene.at.map(|i| i as f64));
-        let [end_x, end_y] = std::array::from_fn(|k| rect.corner[k] + rect.size[k]);
-        let lines = vec![
-            [[rect.corner[0], cross[1]], [end_x, cross[1]]],
-            [[cross[0], rect.corner[1]], [cross[0], end_y]],
-        ];
-        shapes.push(Shape::Lines { lines, width: 1.0, color: CROSS_HAIR });
-        shapes.extend(label(plane.name, &rect));
+        shapes.push(panel.cross_hair(&self.at.map(|i| i as f64)));
+        shapes.extend(label(panel.slice.name, &panel.rect));
         shapes
     }
 
-    /// Whether the axis drawn downward is shown from its end.
-    fn flipped(&self) -> bool {
-        self.scene.style.z_up && self.plane.down == 2
+    /// The lines in which the plane cuts the faces of the cells, each once, in pixels.
+    fn cuts(&self, panel: &Panel) -> Vec<[Place; 2]> {
+        let at = self.at[panel.slice.normal];
+        let level = Level { value: at as f64, own_is_above: at > 0 };
+        let cuts = self.mesh.cuts(panel.slice.normal, level).into_iter();
+        unique(cuts.map(|ends| ends.map(|p| panel.place(&p))))
     }
 
-    /// Where a point, seen along the normal, is in the picture.
-    fn place(&self, p: &Point<3>) -> Place {
-        let Plane { right, down, .. } = *self.plane;
-        let pixels = &self.scene.pixels;
-        let x = (p[right] + 0.5) * pixels[right];
-        let y = (p[down] + 0.5) * pixels[down];
-        let y = if self.flipped() { self.rect.size[1] - y } else { y };
-        [self.rect.corner[0] + x, self.rect.corner[1] + y]
-    }
-
-    fn background(&self, ramp: &Ramp) -> Shape {
-        let Plane { normal, right, down, .. } = *self.plane;
-        let grid = self.scene.image.frame().grid(self.scene.style.units);
-        let (shape, strides) = (grid.shape, grid.strides());
-        let start = self.scene.at[normal] * strides[normal];
-        let samples = self.scene.image.samples();
-        let raster = ramp.raster(samples, shape[right], shape[down], |i, j| {
-            let j = if self.flipped() { shape[down] - 1 - j } else { j };
-            start + i * strides[right] + j * strides[down]
-        });
-        Shape::upright(raster, self.rect)
-    }
-
-    /// Where the plane cuts the faces of the cells, each line once, in pixels.
-    fn cuts(&self) -> Vec<[Place; 2]> {
-        let cuts = self.scene.mesh.cuts(self.plane.normal, self.level()).into_iter();
-        unique(cuts.map(|ends| ends.map(|p| self.place(&p))))
-    }
-
-    fn level(&self) -> Level {
-        let at = self.scene.at[self.plane.normal];
-        Level { value: at as f64, own_is_above: at > 0 }
-    }
-
-    fn atoms(&self) -> Vec<Place> {
-        let (normal, value) = (self.plane.normal, self.level().value);
+    fn atoms(&self, panel: &Panel) -> Vec<Place> {
+        let normal = panel.slice.normal;
+        let value = self.at[normal] as f64;
         let near = |p: &&Point<3>| (p[normal] - value).abs() <= 1.0;
-        self.scene.mesh.atoms().iter().filter(near).map(|p| self.place(p)).collect()
+        self.mesh.atoms().iter().filter(near).map(|p| panel.place(p)).collect()
     }
 }
 
-/// Lines to a hundredth of a pixel, each once and none without length, in order: faces around an edge that lies
-/// in a plane share their cut.
-pub(crate) fn unique(lines: impl Iterator<Item = [Place; 2]>) -> Vec<[Place; 2]> {
-    let rounded = lines.map(|ends| {
-        let [a, b] = ends.map(|p| p.map(|v| (v * 100.0).round() as i64));
-        [a.min(b), a.max(b)]
-    });
-    let mut lines: Vec<[[i64; 2]; 2]> = rounded.filter(|[a, b]| a != b).collect();
-    lines.sort_unstable();
-    lines.dedup();
-    lines.into_iter().map(|l| l.map(|p| p.map(|v| v as f64 / 100.0))).collect()
-}
-
-/// A plane at a constant coordinate. Points exactly on it count as one side, so that no face is cut in
-/// a corner: as above, except on the first plane, below which there is nothing.
-#[derive(Clone, Copy)]
-pub(crate) struct Level {
-    pub value: f64,
-    pub own_is_above: bool,
-}
-
-impl Level {
-    pub fn is_below(&self, x: f64) -> bool {
-        if self.own_is_above { x < self.value } else { x <= self.value }
-    }
-
-    /// The line in which the plane across axis `normal` cuts a convex polygon, if it does.
-    pub fn cut(self, normal: usize, corners: &[Point<3>]) -> Option<[Point<3>; 2]> {
-        let mut ends = (0..corners.len()).filter_map(|at| {
-            let (p, q) = (corners[at], corners[(at + 1) % corners.len()]);
-            if self.is_below(p[normal]) == self.is_below(q[normal]) {
-                return None;
-            }
-            let share = (self.value - p[normal]) / (q[normal] - p[normal]);
-            Some(std::array::from_fn(|k| p[k] + share * (q[k] - p[k])))
-        });
-        Some([ends.next()?, ends.next()?])
-    }
-}
-
-/// What slices show of a mesh.
+/// A mesh that slices can show.
 trait Sliced {
     /// The lines in which a plane cuts the mesh's faces.
     fn cuts(&self, normal: usize, level: Level) -> Vec<[Point<3>; 2]>;
     /// The atoms.
     fn atoms(&self) -> &[Point<3>];
-    /// The typical length of an edge, of samples with sides `step`.
+    /// The typical length of an edge, for samples with sides `step`.
     fn edge(&self, step: &Point<3>) -> Option<f64>;
 }
 
@@ -263,9 +156,10 @@ impl Sliced for PolyMesh<3> {
         self.centers()
     }
 
-    /// From site to site: cells are as large as tetrahedra's edges are long.
+    /// The distance between neighbouring sites, which compares with the edges of tetrahedra.
     fn edge(&self, step: &Point<3>) -> Option<f64> {
-        let faces = (0..self.inner_face_count()).step_by(self.face_count().div_ceil(LOOKS).max(1));
+        let faces =
+            (0..self.inner_face_count()).step_by(self.face_count().div_ceil(EDGE_SAMPLES).max(1));
         let length = |face: usize| {
             let [a, b] = [self.owners()[face], self.neighbours()[face]];
             let [a, b] = [a, b].map(|cell| self.centers()[cell as usize]);

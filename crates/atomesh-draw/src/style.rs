@@ -1,14 +1,14 @@
-//! How pictures look.
+//! The style of pictures.
 
 use atomesh::image::Units;
 
-use crate::DrawError;
+use crate::error::DrawError;
 
 /// An opaque colour: red, green and blue.
 pub type Color = [u8; 3];
 
-/// How a picture looks. The defaults are the paper's: white on an image whose brightest sample is a
-/// middle grey, so that thin edges can be told from it everywhere.
+/// The style of a picture. The defaults are the paper's: white on an image whose brightest sample is a
+/// middle grey, so that thin edges stand out everywhere.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Style {
     /// Whether the mesh's edges are drawn. Default true.
@@ -17,8 +17,8 @@ pub struct Style {
     pub edge_color: Color,
     /// The width of edges in pixels. Default 1.2.
     pub edge_width: f64,
-    /// Whether atoms are drawn: all of them as dots in 2-D, those within one sample of the slice as
-    /// squares in 3-D. Default false; `draw_slices` is usually given true.
+    /// Whether atoms are drawn: in the plane all, as dots; in slices those within one sample, as squares. Default false;
+    /// [`Drawing::space`](crate::Drawing::space) draws them always.
     pub atoms: bool,
     /// The colour of atoms. Default white.
     pub atom_color: Color,
@@ -53,7 +53,7 @@ impl Default for Style {
 }
 
 impl Style {
-    /// The style, if its numbers have a meaning.
+    /// The style, if its numbers are in range.
     pub(crate) fn checked(&self) -> Result<&Self, DrawError> {
         for (name, value, limit) in [
             ("edge_width", self.edge_width, Some(100.0)),

@@ -1,21 +1,23 @@
-//! Pictures as SVG text. Coordinates have two decimals: a hundredth of a pixel.
+//! Pictures as SVG. Coordinates have two decimals, a hundredth of a pixel.
 
 use std::fmt::Write;
 
 use base64::Engine;
 use base64::engine::general_purpose::STANDARD;
 
-use crate::picture::{Picture, Shape};
-use crate::{Color, DrawError, png_encode};
+use crate::error::DrawError;
+use crate::png_encode;
+use crate::raster::Raster;
+use crate::shape::{Place, Shape};
+use crate::style::Color;
 
-/// The picture as SVG.
-pub(crate) fn encode(picture: &Picture) -> Result<Vec<u8>, DrawError> {
-    let (w, h) = (picture.width, picture.height);
+/// A picture of that width and height as SVG.
+pub(crate) fn encode([w, h]: [u32; 2], shapes: &[Shape]) -> Result<Vec<u8>, DrawError> {
     let mut out = format!(
         "<svg xmlns=\"http://www.w3.org/2000/svg\" width=\"{w}\" height=\"{h}\" viewBox=\"0 0 {w} {h}\">\n\
          <path fill=\"#ffffff\" d=\"M0 0H{w}V{h}H0Z\"/>\n"
     );
-    for shape in &picture.shapes {
+    for shape in shapes {
         draw(&mut out, shape)?;
     }
     out.push_str("</svg>\n");
@@ -25,19 +27,7 @@ pub(crate) fn encode(picture: &Picture) -> Result<Vec<u8>, DrawError> {
 fn draw(out: &mut String, shape: &Shape) -> Result<(), DrawError> {
     match shape {
         Shape::Image { raster, corner, right, down } => {
-            let png = STANDARD.encode(png_encode::encode_raster(raster)?);
-            let (w, h) = (raster.columns, raster.rows);
-            let sides = [right.map(|v| v / w as f64), down.map(|v| v / h as f64)];
-            let [[a, b], [c, d]] = sides;
-            let [e, f] = corner.map(number);
-            line(
-                out,
-                format_args!(
-                    "<image width=\"{w}\" height=\"{h}\" \
-                     transform=\"matrix({a:.6} {b:.6} {c:.6} {d:.6} {e} {f})\" \
-                     style=\"image-rendering:pixelated\" href=\"data:image/png;base64,{png}\"/>"
-                ),
-            );
+            image(out, raster, *corner, [*right, *down])?;
         }
         Shape::Fill { rect, color } => {
             let [[x, y], [w, h]] = [rect.corner, rect.size].map(|p| p.map(number));
@@ -49,23 +39,7 @@ fn draw(out: &mut String, shape: &Shape) -> Result<(), DrawError> {
                 ),
             );
         }
-        Shape::Lines { lines, width, color } => {
-            let (color, width) = (hex(*color), number(*width));
-            let mut d = String::new();
-            for (i, [a, b]) in lines.iter().enumerate() {
-                if i == 0 || lines[i - 1][1] != *a {
-                    point(&mut d, 'M', *a);
-                }
-                point(&mut d, 'L', *b);
-            }
-            line(
-                out,
-                format_args!(
-                    "<path fill=\"none\" stroke=\"{color}\" stroke-width=\"{width}\" \
-                     stroke-linecap=\"round\" stroke-linejoin=\"round\" d=\"{d}\"/>"
-                ),
-            );
-        }
+        Shape::Lines { lines, width, color } => strokes(out, lines, *width, *color),
         Shape::Discs { centers, radius, color } => dots(out, centers, *radius, "round", *color),
         Shape::Squares { centers, half, color } => dots(out, centers, *half, "square", *color),
         Shape::Polygons { polygons, color, smooth } => {
@@ -84,8 +58,50 @@ fn draw(out: &mut String, shape: &Shape) -> Result<(), DrawError> {
     Ok(())
 }
 
-/// Lines of no length, whose caps are discs or squares.
-fn dots(out: &mut String, centers: &[[f64; 2]], half: f64, cap: &str, color: Color) {
+/// A raster stretched over a parallelogram.
+fn image(
+    out: &mut String,
+    raster: &Raster,
+    corner: Place,
+    [right, down]: [Place; 2],
+) -> Result<(), DrawError> {
+    let png = STANDARD.encode(png_encode::encode_raster(raster)?);
+    let (w, h) = (raster.columns, raster.rows);
+    let [a, b] = right.map(|v| v / w as f64);
+    let [c, d] = down.map(|v| v / h as f64);
+    let [e, f] = corner.map(number);
+    line(
+        out,
+        format_args!(
+            "<image width=\"{w}\" height=\"{h}\" \
+             transform=\"matrix({a:.6} {b:.6} {c:.6} {d:.6} {e} {f})\" \
+             style=\"image-rendering:pixelated\" href=\"data:image/png;base64,{png}\"/>"
+        ),
+    );
+    Ok(())
+}
+
+/// Lines; one that begins where the one before it ends is joined to it.
+fn strokes(out: &mut String, lines: &[[Place; 2]], width: f64, color: Color) {
+    let (color, width) = (hex(color), number(width));
+    let mut d = String::new();
+    for (i, [a, b]) in lines.iter().enumerate() {
+        if i == 0 || lines[i - 1][1] != *a {
+            point(&mut d, 'M', *a);
+        }
+        point(&mut d, 'L', *b);
+    }
+    line(
+        out,
+        format_args!(
+            "<path fill=\"none\" stroke=\"{color}\" stroke-width=\"{width}\" \
+             stroke-linecap=\"round\" stroke-linejoin=\"round\" d=\"{d}\"/>"
+        ),
+    );
+}
+
+/// Discs or squares, as the caps of lines without length.
+fn dots(out: &mut String, centers: &[Place], half: f64, cap: &str, color: Color) {
     let (color, width) = (hex(color), number(2.0 * half));
     let mut d = String::new();
     for c in centers {
@@ -106,7 +122,7 @@ fn line(out: &mut String, text: std::fmt::Arguments) {
     out.push('\n');
 }
 
-fn point(d: &mut String, command: char, [x, y]: [f64; 2]) {
+fn point(d: &mut String, command: char, [x, y]: Place) {
     write!(d, "{command}{} {}", number(x), number(y)).expect("a String takes all text");
 }
 

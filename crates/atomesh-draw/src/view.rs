@@ -1,15 +1,15 @@
 //! The three slices of an image in space, as in the upper left of the paper's figure 9.
 //!
 //! A parallel projection from above. The slices cut each other into quarters, which are painted from
-//! the farthest to the nearest: beyond the horizontal slice first, and on each side of it beyond the
-//! slice normal to x first.
+//! the farthest to the nearest: first those beyond the horizontal slice, and on each side of it first those beyond the
+//! slice normal to x.
 
 use atomesh::geometry::Point;
 use atomesh::image::Image;
 
-use crate::Style;
-use crate::picture::{Place, Rect, Shape};
 use crate::raster::Ramp;
+use crate::shape::{Place, Rect, Shape};
+use crate::style::Style;
 
 /// How far the box is turned about the vertical, and how far the eye is above it, in radians.
 const TURN: f64 = 0.6;
@@ -18,7 +18,7 @@ const ELEVATION: f64 = 0.45;
 /// The part of the panel that stays empty on each side.
 const MARGIN: f64 = 0.04;
 
-/// The grey of the brightest sample: no edges have to be told from it here.
+/// The grey of the brightest sample; brighter than elsewhere, since there are no edges.
 const BRIGHTNESS: f64 = 0.85;
 
 /// The colours behind the slices and of their outlines.
@@ -57,7 +57,7 @@ enum Half {
     High,
 }
 
-/// Where each axis points on the screen (right, down) and away from the eye.
+/// The direction of each axis in the picture (right, down), and the direction away from the eye.
 #[derive(Clone, Copy)]
 pub(crate) struct Camera {
     axes: [Place; 3],
@@ -65,7 +65,7 @@ pub(crate) struct Camera {
 }
 
 impl Camera {
-    /// z points down, or up; y then points toward the eye, or away, so that nothing is mirrored.
+    /// If z points down, y points toward the eye; if z points up, away from it. So nothing is mirrored.
     pub fn new(z_up: bool) -> Self {
         let sign = if z_up { 1.0 } else { -1.0 };
         let ((sin, cos), (rise, run)) = (TURN.sin_cos(), ELEVATION.sin_cos());
@@ -83,8 +83,8 @@ impl Camera {
         std::array::from_fn(|k| (0..3).map(|axis| p[axis] * self.axes[axis][k]).sum())
     }
 
-    /// The scale and the shift that put a box of these sides into the middle of the rectangle.
-    pub fn fit(&self, sides: &Point<3>, rect: &Rect) -> (f64, Place) {
+    /// What puts a box of these sides into the middle of the rectangle.
+    pub fn fit(&self, sides: &Point<3>, rect: &Rect) -> Fit {
         let corners = (0..8).map(|i| {
             let corner = std::array::from_fn(|k| if i >> k & 1 == 1 { sides[k] } else { 0.0 });
             self.project(&corner)
@@ -98,7 +98,21 @@ impl Camera {
         let scale = |k: usize| rect.size[k] * (1.0 - 2.0 * MARGIN) / (max[k] - min[k]);
         let scale = scale(0).min(scale(1));
         let middle = |k: usize| rect.corner[k] + rect.size[k] / 2.0;
-        (scale, std::array::from_fn(|k| middle(k) - scale * (min[k] + max[k]) / 2.0))
+        let shift = std::array::from_fn(|k| middle(k) - scale * (min[k] + max[k]) / 2.0);
+        Fit { scale, shift }
+    }
+}
+
+/// The scale and then the shift that fit what a camera sees into its panel.
+#[derive(Clone, Copy)]
+pub(crate) struct Fit {
+    scale: f64,
+    shift: Place,
+}
+
+impl Fit {
+    pub fn place(&self, seen: Place) -> Place {
+        std::array::from_fn(|k| self.shift[k] + self.scale * seen[k])
     }
 }
 
@@ -109,7 +123,7 @@ struct View<'a> {
     step: [f64; 3],
     ramp: Ramp,
     camera: Camera,
-    fit: (f64, Place),
+    fit: Fit,
 }
 
 impl View<'_> {
@@ -133,15 +147,11 @@ impl View<'_> {
         let raster = self.ramp.raster(self.image.samples(), columns.len(), rows.len(), |i, j| {
             first + i * strides[right] + j * strides[down]
         });
-        let (scale, shift) = self.fit;
-        let place = |p: Point<3>| -> Place {
-            let flat = self.camera.project(&p);
-            std::array::from_fn(|k| shift[k] + scale * flat[k])
-        };
         let side = |axis: usize, count: usize| -> Place {
-            self.camera.axes[axis].map(|v| v * scale * self.step[axis] * count as f64)
+            self.camera.axes[axis].map(|v| v * self.fit.scale * self.step[axis] * count as f64)
         };
-        let corner = place(std::array::from_fn(|k| start[k] as f64 * self.step[k]));
+        let first = std::array::from_fn(|k| start[k] as f64 * self.step[k]);
+        let corner = self.fit.place(self.camera.project(&first));
         let (right, down) = (side(right, columns.len()), side(down, rows.len()));
         let add = |a: Place, b: Place| [a[0] + b[0], a[1] + b[1]];
         let others = [add(corner, right), add(add(corner, right), down), add(corner, down)];

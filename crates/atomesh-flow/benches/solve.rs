@@ -2,7 +2,7 @@
 
 use atomesh::geometry::Point;
 use atomesh::watch::Silent;
-use atomesh_flow::solve::{Method, SolveOptions, Sparse, System, solve};
+use atomesh_flow::solve::{SolveMethod, SolveOptions, Sparse, System, solve};
 use criterion::{Criterion, criterion_group, criterion_main};
 use rand::{RngExt, SeedableRng};
 use rand_pcg::Pcg64;
@@ -30,7 +30,7 @@ fn cubes<const D: usize>(n: usize) -> (Sparse, Vec<f64>, Vec<Point<D>>) {
     (Sparse::from_entries(count, count, &entries), rhs, places)
 }
 
-fn run<const D: usize>(criterion: &mut Criterion, name: &str, n: usize, method: Method) {
+fn run<const D: usize>(criterion: &mut Criterion, name: &str, n: usize, method: SolveMethod) {
     let (matrix, rhs, places) = cubes::<D>(n);
     let system = System {
         matrix: &matrix,
@@ -50,8 +50,8 @@ fn run<const D: usize>(criterion: &mut Criterion, name: &str, n: usize, method: 
 }
 
 fn benches(criterion: &mut Criterion) {
-    run::<2>(criterion, "factors, 300 x 300", 300, Method::Direct);
-    run::<3>(criterion, "multigrid, 50 x 50 x 50", 50, Method::Iterative);
+    run::<2>(criterion, "factors, 300 x 300", 300, SolveMethod::Direct);
+    run::<3>(criterion, "multigrid, 50 x 50 x 50", 50, SolveMethod::Iterative);
 }
 
 criterion_group!(solving, benches);

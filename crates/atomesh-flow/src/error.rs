@@ -8,7 +8,7 @@ use crate::solve::SolveError;
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]
 #[non_exhaustive]
 pub enum FlowError {
-    /// A permeability that is none.
+    /// A value that is not a permeability.
     #[error(
         "the permeability of cell {cell} is {value:?}; expected a number above 0, or a symmetric tensor whose \
          principal values are above 0"
@@ -19,7 +19,7 @@ pub enum FlowError {
         /// Its tensor, row by row.
         value: Vec<f64>,
     },
-    /// There is not one permeability for each cell.
+    /// The number of permeabilities is not that of the cells.
     #[error("permeabilities of {found} cells; the mesh has {expected}")]
     PermeabilityCount {
         /// The number given.
@@ -27,13 +27,13 @@ pub enum FlowError {
         /// The number of cells.
         expected: usize,
     },
-    /// A tensor where only a number serves.
+    /// A tensor, which two-point flux cannot treat.
     #[error(
-        "the permeability is a tensor, which two-point flux on Voronoi cells answers wrongly; expected one number \
-         for each cell, or triangles or tetrahedra, which the discontinuous Galerkin scheme takes"
+        "the permeability is a tensor, which two-point flux on Voronoi cells cannot treat; expected one number \
+         for each cell, or a mesh of triangles or tetrahedra"
     )]
     Tensor,
-    /// A face between two Voronoi cells that does not stand at a right angle to the line between their sites.
+    /// A face between two Voronoi cells that is not normal to the line between their sites.
     #[error(
         "the normal of the face between cells {} and {} and the line between their sites have the cosine {cosine}; \
          expected 1, as in Voronoi cells that no frame has stretched or sheared",
@@ -45,12 +45,12 @@ pub enum FlowError {
         /// The cosine of the angle.
         cosine: f64,
     },
-    /// No facets of that name.
+    /// An unknown group of facets.
     #[error("no facets are named {name:?}; known are {known}")]
     Group {
         /// The name asked for.
         name: String,
-        /// The names that there are.
+        /// The known names.
         known: String,
     },
     /// A condition on facets inside the mesh, or a barrier on the boundary.
@@ -71,7 +71,7 @@ pub enum FlowError {
         /// The value found.
         value: f64,
     },
-    /// A rate, pressure or flux that is not a finite number.
+    /// A rate, pressure or flux that is not finite.
     #[error("the {what} of {name:?} is {value}; expected a finite number")]
     NotFinite {
         /// The well or group.
@@ -101,24 +101,24 @@ pub enum FlowError {
         /// The equivalent radius of its cells.
         equivalent: f64,
     },
-    /// What goes into a compartment without a pressure does not come out.
+    /// The rates of a compartment without a given pressure do not balance.
     #[error(
-        "compartment {compartment} ({cells} cells, {share:.3} of the mesh, with {inside}) has no pressure that is \
-         fixed, and {rate} flows in; expected rates that sum to 0, or a pressure, or no barrier around it"
+        "compartment {compartment} ({cells} cells, {share:.3} of the mesh, with {inside}) has no given pressure, \
+         and {rate} flows in; expected rates that sum to 0, or a given pressure, or no barrier around it"
     )]
     Unbalanced {
         /// Its number, from 1.
         compartment: usize,
-        /// How many cells it has.
+        /// The number of its cells.
         cells: usize,
         /// Its share of the mesh's volume.
         share: f64,
         /// Its wells and boundaries.
         inside: String,
-        /// What flows in, the sum of all rates.
+        /// The sum of all rates.
         rate: f64,
     },
-    /// An order that there is no basis for.
+    /// An order outside the range of the form.
     #[error("order {found} of the {form} form; expected {least} to {most}")]
     Order {
         /// The order asked for.
@@ -130,18 +130,18 @@ pub enum FlowError {
         /// The highest order that there is.
         most: usize,
     },
-    /// A penalty below the bound from which the equations are proven to be stable.
+    /// A penalty factor below 1, with which the equations may be unstable.
     #[error("the penalty factor is {value}; expected a finite number, 1 or more")]
     Penalty {
         /// The factor found.
         value: f64,
     },
-    /// Discontinuous Galerkin on cells that are no simplices.
+    /// Discontinuous Galerkin on Voronoi cells.
     #[error(
-        "the discontinuous Galerkin scheme has no functions on Voronoi cells; expected triangles or tetrahedra"
+        "the discontinuous Galerkin scheme does not work on Voronoi cells; expected triangles or tetrahedra"
     )]
     NotSimplices,
-    /// A porosity that is none.
+    /// A value that is not a porosity.
     #[error("the porosity of cell {cell} is {value}; expected more than 0, at most 1")]
     Porosity {
         /// The cell.
@@ -149,7 +149,7 @@ pub enum FlowError {
         /// The value found.
         value: f64,
     },
-    /// There is not one porosity for each cell.
+    /// The number of porosities is not that of the cells.
     #[error("porosities of {found} cells; the mesh has {expected}")]
     PorosityCount {
         /// The number given.

@@ -1,4 +1,4 @@
-//! Cells and the facets between them: what both schemes know of a mesh.
+//! Cells and the facets between them: all that both schemes need of a mesh.
 
 use atomesh::features::FeatureFaces;
 use atomesh::geometry::{Point, difference, dot};
@@ -6,21 +6,21 @@ use atomesh::mesh::{Mesh, PolyMesh, Tags, feature_name, side_name};
 
 use crate::problem::Value;
 
-/// A facet between two cells, or of one on the boundary.
+/// A facet between two cells, or of one cell on the boundary.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct FlowFacet<const D: usize> {
     /// The cell that the area vector points out of.
     pub cell: u32,
     /// The cell on the other side, or `None` on the boundary.
     pub neighbour: Option<u32>,
-    /// The normal out of `cell`, as long as the facet is large.
+    /// The area vector: the normal out of `cell`, its length the facet's measure.
     pub area: Point<D>,
     /// The facet's centroid.
     pub centroid: Point<D>,
 }
 
 impl<const D: usize> FlowFacet<D> {
-    /// The facet's area (3-D) or length (2-D).
+    /// The facet's length in the plane, its area in space.
     pub fn measure(&self) -> f64 {
         dot(&self.area, &self.area).sqrt()
     }
@@ -35,32 +35,32 @@ pub struct FacetSet {
     pub facets: Vec<u32>,
 }
 
-/// How the cells of a grid find a place.
+/// What decides which cells hold a place.
 #[derive(Clone, Debug)]
 enum Shape<const D: usize> {
     /// Triangles or tetrahedra.
     Simplices(Mesh<D>),
-    /// Each cell is what is nearest to its site.
+    /// Voronoi cells: each is the part nearest to its site.
     Cells(Box<PolyMesh<D>>),
 }
 
-/// What flow needs to know of a mesh: cells, facets, and names of facets.
+/// The cells and facets of a mesh, and names of facets.
 #[derive(Clone, Debug)]
-pub struct Grid<const D: usize> {
+pub struct FlowGrid<const D: usize> {
     measures: Vec<f64>,
     centroids: Vec<Point<D>>,
     facets: Vec<FlowFacet<D>>,
     sets: Vec<FacetSet>,
-    /// The corners of each facet; none of Voronoi cells.
+    /// The corners of each facet; empty for Voronoi cells.
     corners: Vec<[u32; D]>,
     starts: Vec<u32>,
     facets_of_cells: Vec<u32>,
     shape: Shape<D>,
 }
 
-impl<const D: usize> Grid<D> {
-    /// Of triangles or tetrahedra of positive orientation; facets are those of [`Mesh::facets`], in that order.
-    /// Names come from `tags`.
+impl<const D: usize> FlowGrid<D> {
+    /// The grid of triangles or tetrahedra of positive orientation. Facets are those of [`Mesh::facets`], in that order;
+    /// names come from `tags`.
     ///
     /// # Panics
     /// If the tags are another mesh's.
@@ -96,8 +96,8 @@ impl<const D: usize> Grid<D> {
         Self { corners, ..Self::new(measures, centroids, facets, sets, shape) }
     }
 
-    /// Of Voronoi cells; facets are the mesh's faces, in its order. Named are the sides, `xmin` ... (see
-    /// [`side_name`]), and the features, `feature-1` ....
+    /// The grid of Voronoi cells. Facets are the mesh's faces, in its order. The sides are named `xmin`, ... (see
+    /// [`side_name`]), the features `feature-1`, ...
     pub fn of_cells(mesh: &PolyMesh<D>, features: Option<&FeatureFaces>) -> Self {
         let facet = |face: usize| FlowFacet {
             cell: mesh.owners()[face],
@@ -157,7 +157,7 @@ impl<const D: usize> Grid<D> {
         self.measures.len()
     }
 
-    /// The area (2-D) or volume (3-D) of each cell.
+    /// The area (plane) or volume (space) of each cell.
     pub fn measures(&self) -> &[f64] {
         &self.measures
     }
@@ -172,7 +172,7 @@ impl<const D: usize> Grid<D> {
         &self.facets
     }
 
-    /// The corners of a facet, ascending; `None` of Voronoi cells.
+    /// The corners of a facet, ascending; `None` for Voronoi cells.
     pub fn facet_corners(&self, facet: usize) -> Option<&[u32; D]> {
         self.corners.get(facet)
     }
@@ -196,8 +196,8 @@ impl<const D: usize> Grid<D> {
         &self.facets_of_cells[self.starts[cell] as usize..self.starts[cell + 1] as usize]
     }
 
-    /// The cells that hold a place, ascending; more than one if it lies on a facet or corner of theirs, to
-    /// 10⁻⁹ of a cell's height. Voronoi cells hold what is nearest to their site, so there is one within the box.
+    /// The cells that hold a place, ascending. Of triangles and tetrahedra there are several if it lies on a common facet
+    /// or corner, to 10⁻⁹ of a cell's height; of Voronoi cells one, that of the nearest site. None outside the mesh.
     /// Cost: O(cells).
     pub fn cells_at(&self, place: &Point<D>) -> Vec<u32> {
         match &self.shape {
@@ -278,9 +278,13 @@ fn simplices_at<const D: usize>(mesh: &Mesh<D>, place: &Point<D>) -> Vec<u32> {
     cells.filter(|(_, cell)| near(cell) && holds(cell)).map(|(at, _)| at as u32).collect()
 }
 
-/// The mean of a value over a cell: exact for quadratic fields in triangles and tetrahedra (the mean of the
-/// corners and the centroid, by weight), the value at the centroid in Voronoi cells.
-pub(crate) fn cell_mean<const D: usize>(grid: &Grid<D>, cell: usize, value: &Value<'_, D>) -> f64 {
+/// The mean of a value over a cell: exact for quadratic fields in triangles and tetrahedra (a weighted mean of the
+/// corners and the centroid), the value at the centroid in Voronoi cells.
+pub(crate) fn cell_mean<const D: usize>(
+    grid: &FlowGrid<D>,
+    cell: usize,
+    value: &Value<'_, D>,
+) -> f64 {
     let centre = &grid.centroids[cell];
     if let (Value::Field(_), Shape::Simplices(mesh)) = (value, &grid.shape) {
         let corners = &mesh.corners()[cell * (D + 1)..(cell + 1) * (D + 1)];
@@ -289,10 +293,10 @@ pub(crate) fn cell_mean<const D: usize>(grid: &Grid<D>, cell: usize, value: &Val
     value.at(centre)
 }
 
-/// The integral of a value over a facet: exact for quadratic fields on facets of triangles and tetrahedra, by the
-/// centroid on faces of Voronoi cells.
+/// The integral of a value over a facet: exact for quadratic fields on facets of triangles and tetrahedra, the value at
+/// the centroid times the area on faces of Voronoi cells.
 pub(crate) fn facet_integral<const D: usize>(
-    grid: &Grid<D>,
+    grid: &FlowGrid<D>,
     facet: usize,
     value: &Value<'_, D>,
 ) -> f64 {
@@ -312,7 +316,7 @@ fn quadratic_mean<const D: usize>(
     centre: &Point<D>,
     value: &Value<'_, D>,
 ) -> f64 {
-    // of x² over a simplex of n corners about its centroid: Σ x_i² / (n (n + 1)), which gives the corners' weight
+    // the mean of x² about the centroid of a simplex of n corners is Σ x_i² / (n (n + 1)): the corners' weight
     let n = corners.len() as f64;
     let sum: f64 = corners.iter().map(|&c| value.at(&points[c as usize])).sum();
     let corner = 1.0 / (n * (n + 1.0));

@@ -1,28 +1,27 @@
 //! Steady flow of one fluid on a mesh that follows an image: `−∇·(k∇p) = q` (Hale 2001, section 3.1).
 //!
 //! A [`Problem`] says what flows where, by names and places: permeability, wells, pressure or flux on sides,
-//! barriers with multipliers. A [`Grid`] is what is known of a mesh's cells and facets, whether triangles,
-//! tetrahedra or Voronoi cells. The two make a [`Setting`], in which every facet and well is placed and every
-//! compartment has been found solvable. Then one of two schemes answers with a [`Solution`]:
+//! barriers with multipliers. A [`FlowGrid`] holds the cells and facets of a mesh of triangles, tetrahedra or
+//! Voronoi cells. The two make a [`Setting`], in which every facet and well is placed and every
+//! compartment is known to have a solution. Then one of two schemes computes a [`Solution`]:
 //!
 //! - [`dg`]: discontinuous Galerkin on triangles and tetrahedra, any permeability;
 //! - [`two_point`]: two-point flux on Voronoi cells, isotropic permeability.
 //!
-//! Both conserve mass in every cell, and let pressure jump across barriers. A crate of its own since it brings a
-//! heavy dependency, the sparse direct solver. All lengths are those of the mesh's coordinates; permeability
-//! is in any unit, and rates are then in those of permeability × pressure × length^(D−2).
-
+//! Both conserve mass in every cell, and let pressure jump across barriers. [`FlowMethod`] holds them for callers that
+//! are generic over the dimension. Lengths are in the unit of the mesh's coordinates, permeability in any unit; the
+//! unit of rates is that of permeability × pressure × length^(D−2).
 //!
 //! ```
 //! use atomesh::geometry::Bounds;
 //! use atomesh::mesh::{Delaunay, Tags};
 //! use atomesh::watch::Silent;
-//! use atomesh_flow::{Boundary, Condition, Grid, Problem, Setting, Value, dg};
+//! use atomesh_flow::{Boundary, Condition, FlowGrid, Problem, Setting, Value, dg};
 //!
 //! let points: Vec<[f64; 2]> = (0..25).map(|i| [f64::from(i % 5), f64::from(i / 5)]).collect();
 //! let mesh = Delaunay::<2>::new().connect(&points, &mut Silent)?;
 //! let sides = Tags::sides(&mesh, &Bounds { min: [0.0; 2], max: [4.0; 2] }, 1e-9);
-//! let grid = Grid::of_mesh(&mesh, &sides);
+//! let grid = FlowGrid::of_mesh(&mesh, &sides);
 //! let fixed = |group: &str, pressure| Boundary {
 //!     group: group.into(),
 //!     condition: Condition::Pressure(Value::Constant(pressure)),
@@ -40,6 +39,7 @@
 pub mod dg;
 mod error;
 mod grid;
+mod method;
 mod permeability;
 mod problem;
 mod setting;
@@ -51,7 +51,8 @@ pub mod two_point;
 pub(crate) mod test_meshes;
 
 pub use error::FlowError;
-pub use grid::{FacetSet, FlowFacet, Grid};
+pub use grid::{FacetSet, FlowFacet, FlowGrid};
+pub use method::FlowMethod;
 pub use permeability::{Permeability, Tensor};
 pub use problem::{Barrier, Boundary, Condition, Control, Problem, Value, Well};
 pub use setting::{Compartment, PlacedWell, Setting, well_index};

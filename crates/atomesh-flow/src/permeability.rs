@@ -2,7 +2,7 @@
 
 use crate::error::FlowError;
 
-/// A tensor by its rows; symmetric and positive definite where it is a permeability.
+/// A tensor by its rows; symmetric and positive definite if it is a permeability.
 pub type Tensor<const D: usize> = [[f64; D]; D];
 
 /// The permeability k of `−∇·(k∇p) = q`, constant in each cell. Any unit.
@@ -19,7 +19,7 @@ pub enum Permeability<const D: usize> {
 }
 
 impl<const D: usize> Permeability<D> {
-    /// Finds the first value that is no permeability.
+    /// Refuses the first value that is not a permeability.
     ///
     /// # Errors
     /// [`FlowError::Permeability`] names a cell with a number not above 0 and finite, or a tensor that is not
@@ -67,7 +67,7 @@ impl<const D: usize> Permeability<D> {
         }
     }
 
-    /// The number of a cell, where permeability is the same in all directions by its kind; `None` for tensors.
+    /// The permeability of a cell as a number; `None` for tensors.
     ///
     /// # Panics
     /// If there is no such cell.
@@ -79,7 +79,7 @@ impl<const D: usize> Permeability<D> {
         }
     }
 
-    /// The geometric mean of a cell's principal permeabilities, `det(k)^(1/D)`: what a well in it feels.
+    /// The geometric mean of a cell's principal permeabilities, `det(k)^(1/D)`: the effective permeability around a well.
     ///
     /// # Panics
     /// If there is no such cell.

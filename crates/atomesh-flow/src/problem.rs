@@ -32,12 +32,12 @@ impl<const D: usize> std::fmt::Debug for Value<'_, D> {
     }
 }
 
-/// What holds on a part of the boundary. Where nothing is said nothing flows.
+/// What holds on a part of the boundary. Nothing flows through the rest.
 #[derive(Clone, Copy, Debug)]
 pub enum Condition<'a, const D: usize> {
     /// The pressure.
     Pressure(Value<'a, D>),
-    /// The flow into the domain through a unit of area (3-D) or length (2-D): `k ∂p/∂n`, n outward.
+    /// The flow into the domain through a unit of length (plane) or area (space): `k ∂p/∂n`, n outward.
     Flux(Value<'a, D>),
 }
 
@@ -55,26 +55,25 @@ pub struct Boundary<'a, const D: usize> {
 pub struct Barrier {
     /// The group's name, such as `feature-1`.
     pub group: String,
-    /// What share of the flow passes, 0…1, that would pass between the two cells beside the facet for the same
-    /// difference of their mean pressures: 0 seals, 1 does nothing. It multiplies two-point transmissibilities;
-    /// for other schemes it is the resistance `(1/m − 1)·(δ₁/k₁ + δ₂/k₂)`, δ the distances of the cells' centres
-    /// from the facet.
+    /// The transmissibility multiplier m, 0…1: the share of the flow that passes, for the same mean pressures in the two
+    /// cells beside the facet. 0 seals, 1 does nothing. It multiplies two-point transmissibilities; in other schemes
+    /// it is the resistance `(1/m − 1)·(δ₁/k₁ + δ₂/k₂)`, δ the distances of the cells' centres from the facet.
     pub multiplier: f64,
 }
 
 /// How a well is run.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum Control {
-    /// By its rate: what flows into the domain in a unit of time, below 0 what is taken out.
+    /// By its rate: the flow into the domain per unit of time; below 0 out of it.
     Rate(f64),
-    /// By the pressure at its wall; it needs a radius.
+    /// By the pressure at its wall; the well needs a radius.
     Pressure(f64),
 }
 
-/// A well: a vertical line that a plane is seen along (2-D), a point (3-D).
+/// A well: in the plane a line normal to it, in space a point.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Well<const D: usize> {
-    /// What reports call it.
+    /// Its name in reports.
     pub name: String,
     /// Where it is, inside the mesh.
     pub place: Point<D>,
@@ -89,7 +88,7 @@ pub struct Well<const D: usize> {
 pub struct Problem<'a, const D: usize> {
     /// The permeability k.
     pub permeability: Permeability<D>,
-    /// q: what flows into the domain in a unit of volume (3-D) or area (2-D), wells apart.
+    /// q: the flow into the domain per unit of area (plane) or volume (space), without wells.
     pub source: Option<Value<'a, D>>,
     /// The wells.
     pub wells: Vec<Well<D>>,
@@ -100,7 +99,7 @@ pub struct Problem<'a, const D: usize> {
 }
 
 impl<const D: usize> Default for Problem<'_, D> {
-    /// Permeability 1, and nothing that flows.
+    /// Permeability 1, and no flow.
     fn default() -> Self {
         Self {
             permeability: Permeability::Uniform(1.0),
@@ -113,7 +112,7 @@ impl<const D: usize> Default for Problem<'_, D> {
 }
 
 impl<const D: usize> Problem<'_, D> {
-    /// Gives the wells numbered `open` equal rates that balance those of the other wells.
+    /// Gives the wells numbered `open` equal rates such that the rates of all wells sum to 0.
     ///
     /// # Panics
     /// If there is no such well.

@@ -2,18 +2,18 @@
 
 use atomesh::geometry::{Point, difference};
 
-use crate::grid::Grid;
+use crate::grid::FlowGrid;
 use crate::setting::Setting;
 use crate::solve::SolveReport;
 
-/// What a well does.
+/// The rate and pressures of a well.
 #[derive(Clone, Debug, PartialEq, serde::Serialize)]
 pub struct WellFlow {
     /// Its name.
     pub name: String,
     /// The compartment that it is in, from 1.
     pub compartment: usize,
-    /// What it brings into the domain in a unit of time; below 0 what it takes out.
+    /// The flow into the domain per unit of time; below 0 out of it.
     pub rate: f64,
     /// The mean pressure of its cells.
     pub cell_pressure: f64,
@@ -21,7 +21,7 @@ pub struct WellFlow {
     pub wall_pressure: Option<f64>,
 }
 
-/// What flows in and out.
+/// The mass balance.
 #[derive(Clone, Debug, PartialEq, serde::Serialize)]
 pub struct Balance {
     /// Into the domain through wells of positive rate.
@@ -32,7 +32,7 @@ pub struct Balance {
     pub boundary_in: f64,
     /// Out through the boundary; 0 or more.
     pub boundary_out: f64,
-    /// What the source term q brings.
+    /// What the source term q brings, below 0 takes.
     pub source: f64,
     /// In less out.
     pub error: f64,
@@ -43,7 +43,7 @@ pub struct Balance {
 }
 
 impl Balance {
-    /// The larger of the two errors over the scale; 0 if nothing flows.
+    /// The larger of the two errors, relative to the scale; 0 if nothing flows.
     pub fn relative_error(&self) -> f64 {
         if self.scale > 0.0 { self.cell_error.max(self.error.abs()) / self.scale } else { 0.0 }
     }
@@ -52,25 +52,25 @@ impl Balance {
 /// Steady flow on a grid.
 #[derive(Clone, Debug)]
 pub struct Solution<const D: usize> {
-    /// The mean pressure of each cell (Voronoi cells: that of the site).
+    /// The mean pressure of each cell; of Voronoi cells that at the site.
     pub pressures: Vec<f64>,
-    /// What flows through each facet in a unit of time, out of its `cell`.
+    /// The flow through each facet per unit of time, out of its `cell`.
     pub fluxes: Vec<f64>,
     /// What the source term and wells bring into each cell.
     pub sources: Vec<f64>,
     /// The wells, in the problem's order.
     pub wells: Vec<WellFlow>,
-    /// Compartments in which the pressure is known up to a constant only, from 1: it is 0 in the mean of one cell.
+    /// Compartments, numbered from 1, in which the pressure is known up to a constant only: its mean in one cell is 0.
     pub pinned: Vec<usize>,
     /// How the equations were solved.
     pub solve: SolveReport,
 }
 
 impl<const D: usize> Solution<D> {
-    /// The mean Darcy velocity of each cell, from its fluxes: `v = Σ F_f (x_f − x_K) / |K|`, F_f outward: that
-    /// of the field of the least order that has these fluxes (Raviart & Thomas 1977 in simplices), exact
-    /// where the velocity is constant.
-    pub fn velocities(&self, grid: &Grid<D>) -> Vec<Point<D>> {
+    /// The mean Darcy velocity of each cell from its fluxes, `v = Σ F_f (x_f − x_K) / |K|`, F_f outward. In simplices it is
+    /// the mean of the lowest-order field with these fluxes (Raviart & Thomas 1977). Exact where the velocity is
+    /// constant.
+    pub fn velocities(&self, grid: &FlowGrid<D>) -> Vec<Point<D>> {
         let velocity = |cell: usize| {
             let centre = &grid.centroids()[cell];
             let mut velocity = [0.0; D];
@@ -87,8 +87,8 @@ impl<const D: usize> Solution<D> {
         (0..grid.cell_count()).map(velocity).collect()
     }
 
-    /// What flows in and out, from fluxes and sources alone.
-    pub fn balance(&self, grid: &Grid<D>) -> Balance {
+    /// The mass balance, from fluxes and sources alone.
+    pub fn balance(&self, grid: &FlowGrid<D>) -> Balance {
         let mut balance = Balance {
             // an empty sum is −0
             wells_in: self.wells.iter().fold(0.0, |sum, well| sum + well.rate.max(0.0)),
@@ -120,8 +120,8 @@ impl<const D: usize> Solution<D> {
         balance
     }
 
-    /// The most that flows through a sealed facet, as a share of all that flows.
-    pub fn leak(&self, grid: &Grid<D>, setting: &Setting<'_, D>) -> f64 {
+    /// The largest flow through a sealed facet, as a share of the balance's scale.
+    pub fn leak(&self, grid: &FlowGrid<D>, setting: &Setting<'_, D>) -> f64 {
         let scale = self.balance(grid).scale;
         let sealed = setting.multipliers().iter().zip(&self.fluxes);
         let most =

@@ -6,10 +6,10 @@ use atomesh::watch::Silent;
 use rand::{RngExt, SeedableRng};
 use rand_pcg::Pcg64;
 
-use crate::grid::{FacetSet, Grid};
+use crate::grid::{FacetSet, FlowGrid};
 
-/// Points of a lattice of `steps` steps along each axis of the box, those inside moved at random by up to `jitter`
-/// (below 0.5) of a step along each axis, those on the boundary within their face or edge. Corners stay.
+/// Points of a lattice of `steps` steps along each axis of the box, each moved at random by up to `jitter` (below 0.5) of
+/// a step along each axis. Points on the boundary stay on their face or edge, corners in place.
 pub(crate) fn jittered_points<const D: usize>(
     bounds: &Bounds<D>,
     steps: [usize; D],
@@ -36,7 +36,7 @@ pub(crate) fn jittered_points<const D: usize>(
 }
 
 /// Delaunay's mesh of the points, as a grid whose sides are named `xmin` ... `zmax`.
-pub(crate) fn connect<const D: usize>(delaunay: Delaunay<D>, points: &[Point<D>]) -> Grid<D> {
+pub(crate) fn connect<const D: usize>(delaunay: Delaunay<D>, points: &[Point<D>]) -> FlowGrid<D> {
     let mesh = delaunay.connect(points, &mut Silent).expect("distinct points");
     grid(&mesh, Vec::new())
 }
@@ -47,23 +47,23 @@ pub(crate) fn unit_box<const D: usize>(
     steps: usize,
     jitter: f64,
     seed: u64,
-) -> Grid<D> {
+) -> FlowGrid<D> {
     let bounds = Bounds { min: [0.0; D], max: [1.0; D] };
     connect(delaunay, &jittered_points(&bounds, [steps; D], jitter, seed))
 }
 
 /// A mesh of a box as a grid, its sides named, with more groups of facets.
-pub(crate) fn grid<const D: usize>(mesh: &Mesh<D>, groups: Vec<FacetGroup<D>>) -> Grid<D> {
+pub(crate) fn grid<const D: usize>(mesh: &Mesh<D>, groups: Vec<FacetGroup<D>>) -> FlowGrid<D> {
     let bounds = Bounds::of(mesh.points()).expect("a mesh has points");
     let tolerance = 1e-9 * bounds.extent().iter().fold(0.0_f64, |a, &b| a.max(b));
     let tags = Tags::sides(mesh, &bounds, tolerance);
     let tags = tags.merge(Tags::new(mesh, groups, None).expect("facets of the mesh"));
-    Grid::of_mesh(mesh, &tags.expect("names of their own"))
+    FlowGrid::of_mesh(mesh, &tags.expect("names of their own"))
 }
 
-/// Names the facets inside the mesh of which `holds` is true of every corner.
+/// Names the inner facets for all of whose corners `holds` is true.
 pub(crate) fn name_inner_facets<const D: usize>(
-    grid: &mut Grid<D>,
+    grid: &mut FlowGrid<D>,
     name: &str,
     holds: impl Fn(&Point<D>) -> bool,
 ) {

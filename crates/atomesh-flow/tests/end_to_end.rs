@@ -8,7 +8,7 @@ use atomesh::mesh::{Delaunay, FacetGroup, Mesh, Tags};
 use atomesh::run::{Inputs, MeshOptions, Method, Size, prepare};
 use atomesh::watch::Silent;
 use atomesh_flow::dg::{self, DgOptions, DgSolution};
-use atomesh_flow::{Barrier, Boundary, Condition, Grid, Problem, Setting, Value};
+use atomesh_flow::{Barrier, Boundary, Condition, FlowGrid, Problem, Setting, Value};
 
 /// The side of the square, in samples.
 const SIDE: f64 = 383.0;
@@ -101,8 +101,8 @@ fn conforming(step: f64) -> (Mesh<2>, Tags<2>) {
 }
 
 /// Flow from left to right past sealed fractures.
-fn solved(mesh: &Mesh<2>, tags: &Tags<2>, order: usize) -> (Grid<2>, DgSolution<2>) {
-    let grid = Grid::of_mesh(mesh, tags);
+fn solved(mesh: &Mesh<2>, tags: &Tags<2>, order: usize) -> (FlowGrid<2>, DgSolution<2>) {
+    let grid = FlowGrid::of_mesh(mesh, tags);
     let side = |group: &str, pressure: f64| Boundary {
         group: group.to_string(),
         condition: Condition::Pressure(Value::Constant(pressure)),
@@ -125,7 +125,7 @@ fn solved(mesh: &Mesh<2>, tags: &Tags<2>, order: usize) -> (Grid<2>, DgSolution<
 }
 
 /// The pressure at a place, the mean of the cells that hold it.
-fn pressure(grid: &Grid<2>, answer: &DgSolution<2>, place: &Point<2>) -> f64 {
+fn pressure(grid: &FlowGrid<2>, answer: &DgSolution<2>, place: &Point<2>) -> f64 {
     let cells = grid.cells_at(place);
     let sum: f64 = cells.iter().map(|&cell| answer.pressure(cell as usize, place)).sum();
     sum / cells.len() as f64

@@ -6,8 +6,7 @@
 //! ```
 
 use atomesh::energy::{Engine, PairsEngine, SampledEngine};
-use atomesh::fields::NominalDistance;
-use atomesh::fields::{ImageWeight, Interpolation, ScalarField};
+use atomesh::fields::{FieldsView, ImageWeight, Interpolation, NominalDistance, ScalarField};
 use atomesh::geometry::{Point, compact_order};
 use atomesh::image::Grid;
 use atomesh::minimize::{Lbfgs, LbfgsOptions, Objective};
@@ -36,15 +35,18 @@ fn crystal(side: usize) -> Vec<Point<3>> {
 fn engines(criterion: &mut Criterion) {
     let grid = Grid { shape: [256; 3], step: [1.0; 3] };
     let samples = (0..grid.sample_count()).map(|i| -((i * 31 % 101) as f32) / 101.0).collect();
-    let Ok(potential) = ScalarField::new(grid, samples, Interpolation::Linear) else { return };
+    let Ok(potential) = ScalarField::potential(grid, samples, Interpolation::Linear) else {
+        return;
+    };
     let Ok(distance) = NominalDistance::constant(&grid, DISTANCE) else { return };
     let Ok(weight) = ImageWeight::constant(0.5) else { return };
+    let fields = FieldsView { potential: &potential, weight: &weight, distance: &distance };
     let atoms = crystal(256);
     let mut gradient = vec![[0.0; 3]; atoms.len()];
     let mut group = criterion.benchmark_group("energy");
     group.sample_size(20).throughput(Throughput::Elements(atoms.len() as u64));
 
-    let mut pairs = PairsEngine::new(&potential, &weight, &distance);
+    let mut pairs = PairsEngine::new(fields);
     pairs.prepare(&atoms, 0.1);
     group.bench_function("pairs", |b| b.iter(|| pairs.evaluate(&atoms, &mut gradient)));
     group.bench_function("lists", |b| b.iter(|| pairs.prepare(&atoms, f64::INFINITY)));
@@ -54,7 +56,7 @@ fn engines(criterion: &mut Criterion) {
             pairs.evaluate(&atoms, &mut gradient)
         });
     });
-    let mut sampled = SampledEngine::new(&potential, &weight, &distance);
+    let mut sampled = SampledEngine::new(fields);
     sampled.prepare(&atoms, 0.1);
     group.bench_function("sampled", |b| b.iter(|| sampled.evaluate(&atoms, &mut gradient)));
     group.bench_function("order", |b| b.iter(|| compact_order(&atoms)));
@@ -63,7 +65,8 @@ fn engines(criterion: &mut Criterion) {
     let Ok(none) = ImageWeight::constant(0.0) else { return };
     let atoms = crystal(708);
     let mut gradient = vec![[0.0; 3]; atoms.len()];
-    let mut pairs = PairsEngine::new(&potential, &none, &distance);
+    let fields = FieldsView { weight: &none, ..fields };
+    let mut pairs = PairsEngine::new(fields);
     pairs.prepare(&atoms, 0.1);
     let mut group = criterion.benchmark_group("million");
     group.sample_size(10).throughput(Throughput::Elements(atoms.len() as u64));

@@ -1,11 +1,11 @@
 //! Improving tetrahedra: the slivers of a mesh without features, and facets of one with a sphere.
 
 use atomesh::enhance::{FeatureOptions, Features, enhance};
-use atomesh::fields::Fields;
+use atomesh::fields::FieldsView;
 use atomesh::fields::NominalDistance;
 use atomesh::fields::{ImageWeight, Interpolation, ScalarField};
 use atomesh::image::Units;
-use atomesh::improve::{Align, ImproveOptions, Improver, Space};
+use atomesh::improve::{Align, ImproveOptions, Improver, SpaceImprover};
 use atomesh::lattice::{Crystal, GrowOptions, grow};
 use atomesh::mesh::Delaunay;
 use atomesh::optimize::{OptimizeOptions, optimize};
@@ -18,10 +18,10 @@ fn benches(criterion: &mut Criterion) {
     let edges = FeatureOptions { features: Features::Edges, ..Default::default() };
     let b = enhance(&image, &edges, &mut Silent).expect("edges").values;
     let grid = image.frame().grid(Units::Physical);
-    let potential = ScalarField::new(grid, b, Interpolation::Linear).expect("a potential");
+    let potential = ScalarField::potential(grid, b, Interpolation::Linear).expect("a potential");
     let weight = ImageWeight::constant(0.45).expect("a weight");
     let distance = NominalDistance::constant(&grid, 4.0).expect("a distance");
-    let fields = Fields { potential: &potential, weight: &weight, distance: &distance };
+    let fields = FieldsView { potential: &potential, weight: &weight, distance: &distance };
     let crystal = Crystal::body_centered_cubic();
     let lattice = grow(&crystal, grid.bounds(), &distance, &GrowOptions::default(), &mut Silent);
     let options = OptimizeOptions::for_dimension(3);
@@ -36,7 +36,8 @@ fn benches(criterion: &mut Criterion) {
         let options = ImproveOptions { align, ..ImproveOptions::for_dimension(3) };
         let name = format!("{align:?}, {} cells", mesh.cell_count());
         group.bench_function(name, |bencher| {
-            let improve = || Space.improve(mesh.clone(), &freedom, fields, &options, &mut Silent);
+            let improve =
+                || SpaceImprover.improve(mesh.clone(), &freedom, fields, &options, &mut Silent);
             bencher.iter(improve);
         });
     }

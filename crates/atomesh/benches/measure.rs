@@ -6,7 +6,7 @@ use atomesh::measure::{
     AlignmentOptions, SampledPotential, alignment, features, fidelity, shape, shapes,
 };
 use atomesh::mesh::Mesh;
-use atomesh::sample::{SampleOptions, Statistic, sample_placed};
+use atomesh::sample::{SampleOptions, Statistic, sample_in_frame};
 use atomesh::watch::Silent;
 use criterion::{Criterion, Throughput, criterion_group, criterion_main};
 
@@ -71,10 +71,10 @@ fn measures(criterion: &mut Criterion) {
     let image = Samples::F32(potential);
     group.bench_function("sample", |b| {
         let options = SampleOptions::new(&[Statistic::Mean, Statistic::Total]);
-        b.iter(|| sample_placed(&mesh, &frame, &image, options, &mut Silent));
+        b.iter(|| sample_in_frame(&mesh, &frame, &image, options, &mut Silent));
     });
     group.bench_function("fidelity", |b| {
-        b.iter(|| fidelity(&mesh, (&frame, &image), &mut Silent));
+        b.iter(|| fidelity(&mesh, &frame, &image, &mut Silent));
     });
     group.finish();
 }

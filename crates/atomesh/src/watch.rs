@@ -58,11 +58,34 @@ impl Phase {
     }
 }
 
+/// The atoms between two iterations, as plain rows of numbers, so that one watch serves the plane and space.
+#[derive(Clone, Copy, Debug)]
+#[non_exhaustive]
+pub struct AtomsView<'a> {
+    /// Coordinates of an atom: 2 or 3.
+    pub dimension: usize,
+    /// x, y (and z) of one atom after another, in lattice units.
+    pub coordinates: &'a [f64],
+    /// The nominal distance of each atom, in lattice units.
+    pub distances: &'a [f64],
+    /// (1 − β) A, the pairs' part of the energy.
+    pub energy_atomic: f64,
+    /// β B, the image's part.
+    pub energy_image: f64,
+}
+
 /// Listens to long work and may end it.
 pub trait Watch {
     /// Called between iterations with the phase, the share of it done in 0..=1 and, where there is
     /// one, the energy; `Break` ends the work early.
     fn step(&mut self, phase: Phase, done: f64, energy: Option<f64>) -> ControlFlow<()>;
+
+    /// Called after each iteration that lowered the energy, with the atoms where they are then. Nothing is
+    /// copied for it. In a stage with a smoothed image the image's part is that of the smoothed one.
+    /// Default: nothing.
+    fn atoms(&mut self, phase: Phase, atoms: AtomsView<'_>) {
+        let _ = (phase, atoms);
+    }
 }
 
 /// Listens to nothing and never ends the work.

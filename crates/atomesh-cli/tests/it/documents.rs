@@ -107,7 +107,9 @@ fn ci_runs_the_commands_of_the_readme() {
 #[test]
 fn comments_cite_what_the_references_list() {
     let references = read("REFERENCES.md");
-    for crate_name in ["atomesh", "atomesh-flow", "atomesh-io", "atomesh-draw", "atomesh-cli"] {
+    let crates =
+        ["atomesh", "atomesh-flow", "atomesh-io", "atomesh-draw", "atomesh-job", "atomesh-cli"];
+    for crate_name in crates {
         let code = sources(&root().join("crates").join(crate_name).join("src"));
         for key in citations(&code) {
             assert!(references.contains(&format!("**{key}**")), "{crate_name} cites {key}");

@@ -1,13 +1,13 @@
-//! Vectors as arrows: which are drawn, how long, and their outline.
+//! Vectors as arrows: their choice, their length and their outline.
 
-use crate::picture::Place;
+use crate::shape::Place;
 
-/// A vector in a sheet: where its middle is, where it points, in pixels.
+/// A vector on a canvas: where its middle is, where it points, in pixels.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(super) struct Vector {
     pub middle: Place,
     pub along: Place,
-    /// The size of what it stands for: the larger ones are drawn before others.
+    /// The size of its cell: of vectors too near to each other that of the largest is drawn.
     pub weight: f64,
 }
 
@@ -17,13 +17,13 @@ impl Vector {
     }
 }
 
-/// The share of flowing cells that are no faster than a brisk flow.
+/// The share of flowing cells that are at most as fast as a brisk flow.
 const BRISK: f64 = 0.9;
 
-/// What is slower than this share of the fastest does not flow: it is rounding, as in a sealed compartment.
+/// Speeds up to this share of the fastest are rounding, as in a sealed compartment.
 const STILL: f64 = 1e-9;
 
-/// The speed of a brisk flow: of nine cells of ten that flow at all; 0 if none does.
+/// The speed of a brisk flow, the 90th percentile of the cells that flow; 0 if none does.
 pub(super) fn brisk(speeds: impl Iterator<Item = f64>) -> f64 {
     let mut speeds: Vec<f64> = speeds.filter(|speed| speed.is_finite()).collect();
     let most = speeds.iter().copied().fold(0.0, f64::max);
@@ -35,7 +35,7 @@ pub(super) fn brisk(speeds: impl Iterator<Item = f64>) -> f64 {
     *speeds.select_nth_unstable_by(at, f64::total_cmp).1
 }
 
-/// Vectors no nearer to each other than `spacing`: the heaviest ones, the earlier of equals. Cost: O(n log n).
+/// Vectors at least `spacing` apart: the heaviest first, of equals the earlier. Cost: O(n log n).
 pub(super) fn thinned(mut vectors: Vec<Vector>, spacing: f64) -> Vec<Vector> {
     vectors.sort_by(|a, b| b.weight.total_cmp(&a.weight));
     let bin = |p: &Place| p.map(|x| (x / spacing).floor() as i64);
@@ -58,10 +58,10 @@ pub(super) fn thinned(mut vectors: Vec<Vector>, spacing: f64) -> Vec<Vector> {
 const SHAFT: f64 = 2.0;
 const HEAD: f64 = 6.0;
 
-/// The most of an arrow's length that its head takes.
+/// The largest share of an arrow's length that its head takes.
 const HEAD_SHARE: f64 = 0.55;
 
-/// The arrow's outline, wider by `halo` on all sides: a shaft and a head, smaller where it is short.
+/// The arrow's outline, wider by `halo` on all sides: a shaft and a head, smaller if the arrow is short.
 pub(super) fn outline(vector: &Vector, halo: f64) -> Vec<Place> {
     let length = vector.length();
     let along = vector.along.map(|x| x / length);

@@ -1,9 +1,9 @@
-//! Polygons and lines cut by a rectangle.
+//! Polygons and lines clipped to a rectangle.
 
-use crate::picture::{Place, Rect};
+use crate::shape::{Place, Rect};
 
-/// The part of a polygon within a rectangle (Sutherland & Hodgman 1974): cut by one side after another. Parts of
-/// one that is not convex stay joined along the sides, where they have no area.
+/// The part of a polygon within a rectangle, by clipping with one side after another (Sutherland & Hodgman 1974). Parts of
+/// a non-convex polygon stay joined by lines without area along the sides.
 pub(super) fn polygon(corners: &[Place], rect: &Rect) -> Vec<Place> {
     let mut kept = corners.to_vec();
     for side in 0..4 {
@@ -35,7 +35,7 @@ pub(super) fn line([mut a, mut b]: [Place; 2], rect: &Rect) -> Option<[Place; 2]
     Some([a, b])
 }
 
-/// How far inside a side a place is: left, top, right, bottom.
+/// The distance of a place inward from a side: left, top, right, bottom.
 fn depth(p: &Place, rect: &Rect, side: usize) -> f64 {
     let k = side % 2;
     if side < 2 { p[k] - rect.corner[k] } else { rect.corner[k] + rect.size[k] - p[k] }

@@ -1,15 +1,15 @@
-//! Flow as it is seen from above: the box, barriers, streamlines and wells.
+//! Flow in space, seen from above: the box, barriers, streamlines and wells.
 //!
-//! A parallel projection, that of the slices in space; pieces are painted from the farthest to the nearest.
+//! The parallel projection is that of the slices in space. Pieces are painted from the farthest to the nearest.
 
 use atomesh::geometry::{Point, difference, dot};
 
-use super::sheet::{Looks, Mark, mark_shapes};
-use super::slices::Scene;
-use crate::Color;
+use super::canvas::{Appearance, Mark, mark_shapes};
+use super::scene::Scene;
 use crate::color_map::PLASMA;
-use crate::picture::{Place, Rect, Shape};
-use crate::view::{BACKGROUND, Camera, OUTLINE, view};
+use crate::shape::{Place, Rect, Shape};
+use crate::style::Color;
+use crate::view::{BACKGROUND, Camera, Fit, OUTLINE, view};
 
 /// The width of streamlines in pixels.
 const LINE: f64 = 1.6;
@@ -17,14 +17,12 @@ const LINE: f64 = 1.6;
 /// The greys of barriers seen edge-on and from the front.
 const BARRIER: [f64; 2] = [110.0, 225.0];
 
-/// The panel: barriers, streamlines and wells; the slices of the image if there are none.
-pub(super) fn in_space(scene: &Scene, looks: &Looks, rect: Rect) -> Vec<Shape> {
+/// The panel: barriers, streamlines and wells, or the slices of the image if there are none.
+pub(super) fn in_space(scene: &Scene, look: &Appearance, rect: Rect) -> Vec<Shape> {
     let flow = scene.flow;
     let is_empty = flow.barriers.is_empty() && flow.lines.is_empty() && flow.wells.is_empty();
     if let (Some(image), true) = (flow.image, is_empty) {
-        let shape = image.frame().shape();
-        let at = std::array::from_fn(|k| (scene.at[k].round().max(0.0) as usize).min(shape[k] - 1));
-        return view(image, at, scene.style, rect);
+        return view(image, scene.sample(image), scene.style, rect);
     }
     let eye = Eye::new(scene, &rect);
     let mut shapes = vec![Shape::Fill { rect, color: BACKGROUND }];
@@ -33,16 +31,16 @@ pub(super) fn in_space(scene: &Scene, looks: &Looks, rect: Rect) -> Vec<Shape> {
     let mut pieces: Vec<(f64, Color, Piece)> = Vec::new();
     for &facet in flow.barriers {
         let corners = scene.corners(&scene.facets[facet as usize]);
-        let (depth, _) = eye.depth(&corners);
+        let depth = eye.depth(&corners);
         let places = corners.iter().map(|p| eye.place(p)).collect();
         pieces.push((depth, eye.shade(&corners), Piece::Facet(places)));
     }
-    if let Some(range) = looks.time {
+    if let Some(range) = look.time {
         for line in flow.lines {
             for (ends, times) in line.points.windows(2).zip(line.times.windows(2)) {
                 let color = PLASMA.at(range.share(0.5 * (times[0] + times[1])));
                 let places = [eye.place(&ends[0]), eye.place(&ends[1])];
-                pieces.push((eye.depth(ends).0, color, Piece::Line(places)));
+                pieces.push((eye.depth(ends), color, Piece::Line(places)));
             }
         }
     }
@@ -64,7 +62,7 @@ enum Piece {
     Line([Place; 2]),
 }
 
-/// Shapes of pieces in their order, those of one kind and colour that follow each other in one.
+/// The shapes of pieces in their order; consecutive pieces of one kind and colour are one shape.
 fn painted(pieces: Vec<(f64, Color, Piece)>) -> Vec<Shape> {
     let mut shapes: Vec<Shape> = Vec::new();
     for (_, own, piece) in pieces {
@@ -88,11 +86,11 @@ fn painted(pieces: Vec<(f64, Color, Piece)>) -> Vec<Shape> {
     shapes
 }
 
-/// The eye, and how far what it sees is shrunk and shifted to fit into the panel.
+/// The camera, and what fits its picture into the panel.
 struct Eye<'a> {
     scene: &'a Scene<'a>,
     camera: Camera,
-    fit: (f64, Place),
+    fit: Fit,
 }
 
 impl<'a> Eye<'a> {
@@ -102,22 +100,19 @@ impl<'a> Eye<'a> {
         Self { scene, camera, fit }
     }
 
-    /// The point in pixels of the box, from its least corner on.
+    /// The point relative to the box's least corner, in pixels.
     fn in_box(&self, p: &Point<3>) -> Point<3> {
         self.scene.in_pixels(&difference(p, &self.scene.first))
     }
 
     fn place(&self, p: &Point<3>) -> Place {
-        let (scale, shift) = self.fit;
-        let flat = self.camera.project(&self.in_box(p));
-        std::array::from_fn(|k| shift[k] + scale * flat[k])
+        self.fit.place(self.camera.project(&self.in_box(p)))
     }
 
-    /// How far away the middle of some points is, and the middle.
-    fn depth(&self, points: &[Point<3>]) -> (f64, Point<3>) {
+    /// The distance from the eye of the mean of some points.
+    fn depth(&self, points: &[Point<3>]) -> f64 {
         let mean = |k: usize| points.iter().map(|p| p[k]).sum::<f64>() / points.len() as f64;
-        let middle = std::array::from_fn(mean);
-        (dot(&self.in_box(&middle), &self.camera.away), middle)
+        dot(&self.in_box(&std::array::from_fn(mean)), &self.camera.away)
     }
 
     /// The grey of a facet, lighter the more it faces the eye.
@@ -134,7 +129,7 @@ impl<'a> Eye<'a> {
         [(least + share * (most - least)).round() as u8; 3]
     }
 
-    /// The edges of the box: those that its inside hides nothing of, and those in front.
+    /// The edges of the box: those behind its contents, and those in front.
     fn frame(&self) -> [Vec<[Place; 2]>; 2] {
         let Scene { first, extent, .. } = self.scene;
         let corner = |at: usize| -> Point<3> {

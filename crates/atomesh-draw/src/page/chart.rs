@@ -18,36 +18,46 @@ pub(super) struct Chart<'a> {
     pub mark: Option<(f64, &'a str)>,
 }
 
-/// The drawing's size, and the room around its bars: left, right, above, below.
+/// The size of the figure, and the room around its bars: left, right, above, below.
 const SIZE: [f64; 2] = [380.0, 190.0];
 const ROOM: [f64; 4] = [8.0, 18.0, 34.0, 34.0];
 
-/// Bars kept beyond the first and the last that hold anything.
+/// Empty classes shown beyond the first and the last that are not empty.
 const BESIDE: usize = 1;
 
 /// Steps of an axis: 1, 2 or 5 times a power of ten.
 const STEPS: [f64; 3] = [1.0, 2.0, 5.0];
 
+/// The classes of the histogram that are shown, and their places.
+struct Axis {
+    first: usize,
+    last: usize,
+    /// The width of a class, and of its bar in pixels.
+    class: f64,
+    bar: f64,
+}
+
+/// The lower end of the bars.
+const BOTTOM: f64 = SIZE[1] - ROOM[3];
+
+impl Axis {
+    /// The lower bounds of the first class and of the one beyond the last.
+    fn ends(&self) -> [f64; 2] {
+        [self.first as f64 * self.class, (self.last + 1) as f64 * self.class]
+    }
+
+    /// Where a value is, in pixels.
+    fn x(&self, value: f64) -> f64 {
+        ROOM[0] + self.bar * (value / self.class - self.first as f64)
+    }
+}
+
 impl Chart<'_> {
     /// The figure; nothing if there is nothing to count.
     pub fn svg(&self) -> String {
-        let counts = &self.histogram.counts;
-        let total: u64 = counts.iter().sum();
-        let (Some(first), Some(last)) =
-            (counts.iter().position(|&c| c > 0), counts.iter().rposition(|&c| c > 0))
-        else {
-            return String::new();
-        };
-        let width = self.histogram.width;
-        let marked = self.mark.map(|(at, _)| (at / width) as usize).filter(|&i| i < counts.len());
-        let first = first.min(marked.unwrap_or(first)).saturating_sub(BESIDE);
-        let last = (last.max(marked.unwrap_or(last)) + BESIDE).min(counts.len() - 1);
-        let most = counts.iter().copied().max().unwrap_or(1) as f64;
-        let (left, bottom) = (ROOM[0], SIZE[1] - ROOM[3]);
-        let bar = (SIZE[0] - ROOM[0] - ROOM[1]) / (last - first + 1) as f64;
-        let height = bottom - ROOM[2];
-        let x = |value: f64| left + bar * (value / width - first as f64);
-
+        let Some(axis) = self.axis() else { return String::new() };
+        let total: u64 = self.histogram.counts.iter().sum();
+        let most = self.histogram.counts.iter().copied().max().unwrap_or(1);
         let label = format!("Histogram: {}, {} {}", self.title, grouped(total), self.of);
         let mut out = format!(
             "<figure><svg viewBox=\"0 0 {} {}\" role=\"img\" aria-label=\"{}\">\n",
@@ -55,77 +65,100 @@ impl Chart<'_> {
             SIZE[1],
             escape(&label)
         );
-        let title = escape(self.title);
+        let (left, title) = (ROOM[0], escape(self.title));
         let _ = writeln!(out, "<text class=\"title\" x=\"{left}\" y=\"14\">{title}</text>");
-        for (i, &count) in counts.iter().enumerate().take(last + 1).skip(first) {
-            if count == 0 {
-                continue;
-            }
-            // a bar with anything in it is seen
-            let tall = (height * count as f64 / most).max(1.0);
-            let share = 100.0 * count as f64 / total as f64;
-            let from = number(i as f64 * width);
-            let to = if i + 1 == counts.len() {
-                "and more".to_owned()
-            } else {
-                format!("to {}", number((i + 1) as f64 * width))
-            };
-            let _ = writeln!(
-                out,
-                "<rect class=\"bar\" x=\"{:.2}\" y=\"{:.2}\" width=\"{:.2}\" height=\"{tall:.2}\">\
-                 <title>{from} {to}{}: {} ({share:.2} %)</title></rect>",
-                x(i as f64 * width) + 0.5,
-                bottom - tall,
-                (bar - 1.0).max(0.5),
-                escape(self.unit),
-                grouped(count),
-            );
-        }
-        let _ =
-            writeln!(out, "<path class=\"axis\" d=\"M{left} {bottom}H{}\"/>", SIZE[0] - ROOM[1]);
-        self.ticks(&mut out, (first as f64 * width, (last + 1) as f64 * width), x);
+        self.bars(&mut out, &axis, total, most);
+        let right = SIZE[0] - ROOM[1];
+        let _ = writeln!(out, "<path class=\"axis\" d=\"M{left} {BOTTOM}H{right}\"/>");
+        self.ticks(&mut out, &axis);
         if let Some((at, name)) = self.mark {
-            let (at, name) = (x(at), escape(name));
-            let _ =
-                writeln!(out, "<path class=\"mark\" d=\"M{at:.2} {}V{bottom}\"/>", ROOM[2] - 6.0);
-            let anchor = if at > SIZE[0] / 2.0 { "end" } else { "start" };
-            let _ = writeln!(
-                out,
-                "<text x=\"{at:.2}\" y=\"{}\" text-anchor=\"{anchor}\">{name}</text>",
-                ROOM[2] - 9.0
-            );
+            mark(&mut out, axis.x(at), name);
         }
         let _ = writeln!(
             out,
             "</svg><figcaption>{} {}; tallest bar {}</figcaption></figure>",
             grouped(total),
             escape(self.of),
-            grouped(most as u64)
+            grouped(most)
         );
         out
     }
 
+    /// From the first class that is not empty, or has the mark, to the last, and [`BESIDE`] more; `None` if all are empty.
+    fn axis(&self) -> Option<Axis> {
+        let counts = &self.histogram.counts;
+        let first = counts.iter().position(|&c| c > 0)?;
+        let last = counts.iter().rposition(|&c| c > 0)?;
+        let class = self.histogram.width;
+        let marked = self.mark.map(|(at, _)| (at / class) as usize).filter(|&i| i < counts.len());
+        let first = first.min(marked.unwrap_or(first)).saturating_sub(BESIDE);
+        let last = (last.max(marked.unwrap_or(last)) + BESIDE).min(counts.len() - 1);
+        let bar = (SIZE[0] - ROOM[0] - ROOM[1]) / (last - first + 1) as f64;
+        Some(Axis { first, last, class, bar })
+    }
+
+    fn bars(&self, out: &mut String, axis: &Axis, total: u64, most: u64) {
+        let counts = &self.histogram.counts;
+        for (i, &count) in counts.iter().enumerate().take(axis.last + 1).skip(axis.first) {
+            if count == 0 {
+                continue;
+            }
+            // no bar of a class that is not empty is invisible
+            let tall = ((BOTTOM - ROOM[2]) * count as f64 / most as f64).max(1.0);
+            let share = 100.0 * count as f64 / total as f64;
+            let from = number(i as f64 * axis.class);
+            let to = if i + 1 == counts.len() {
+                "and more".to_owned()
+            } else {
+                format!("to {}", number((i + 1) as f64 * axis.class))
+            };
+            let _ = writeln!(
+                out,
+                "<rect class=\"bar\" x=\"{:.2}\" y=\"{:.2}\" width=\"{:.2}\" height=\"{tall:.2}\">\
+                 <title>{from} {to}{}: {} ({share:.2} %)</title></rect>",
+                axis.x(i as f64 * axis.class) + 0.5,
+                BOTTOM - tall,
+                (axis.bar - 1.0).max(0.5),
+                escape(self.unit),
+                grouped(count),
+            );
+        }
+    }
+
     /// Numbers under the axis.
-    fn ticks(&self, out: &mut String, (from, to): (f64, f64), x: impl Fn(f64) -> f64) {
+    fn ticks(&self, out: &mut String, axis: &Axis) {
+        let [from, to] = axis.ends();
         let rough = (to - from) / 6.0;
         let power = 10f64.powf(rough.log10().floor());
         let step = STEPS.into_iter().map(|s| s * power).find(|s| *s >= rough);
         let step = step.unwrap_or(10.0 * power);
-        let y = SIZE[1] - ROOM[3];
         let mut i = (from / step - 1e-9).ceil() as i64;
         while (i as f64) * step <= to * (1.0 + 1e-9) {
-            let (value, at) = (i as f64 * step, x(i as f64 * step));
+            let value = i as f64 * step;
+            let at = axis.x(value);
             let _ = writeln!(
                 out,
-                "<path class=\"axis\" d=\"M{at:.2} {y}v4\"/>\
+                "<path class=\"axis\" d=\"M{at:.2} {BOTTOM}v4\"/>\
                  <text x=\"{at:.2}\" y=\"{}\" text-anchor=\"middle\">{}{}</text>",
-                y + 17.0,
+                BOTTOM + 17.0,
                 number(value),
                 escape(self.unit)
             );
             i += 1;
         }
     }
+}
+
+/// A line across the bars, with its name above.
+fn mark(out: &mut String, at: f64, name: &str) {
+    let name = escape(name);
+    let _ = writeln!(out, "<path class=\"mark\" d=\"M{at:.2} {}V{BOTTOM}\"/>", ROOM[2] - 6.0);
+    let anchor = if at > SIZE[0] / 2.0 { "end" } else { "start" };
+    let _ = writeln!(
+        out,
+        "<text x=\"{at:.2}\" y=\"{}\" text-anchor=\"{anchor}\">{name}</text>",
+        ROOM[2] - 9.0
+    );
 }
 
 /// A number of a few digits.

@@ -1,7 +1,7 @@
-//! A report as one page of HTML that needs nothing else: no scripts, fonts or files.
+//! A report as one self-contained page of HTML, without scripts, fonts or other files.
 //!
-//! Pictures are embedded, histograms are inline SVG in the page's colours, light or dark as the reader has it;
-//! on paper it is black on white. The same input gives the same bytes.
+//! Pictures are embedded, histograms are inline SVG in the page's colours, light or dark as the reader's system is, black
+//! on white in print. The same input gives the same bytes.
 
 mod chart;
 mod figures;
@@ -21,10 +21,10 @@ use chart::Chart;
 use figures::Table;
 use text::{escape, grouped, real};
 
-/// Lines and dots that a picture may have and still be smaller as SVG.
+/// The number of lines and dots up to which a picture is smaller as SVG.
 const FEW_SHAPES: usize = 20_000;
 
-/// What a page shows.
+/// The contents of a page.
 #[derive(Clone, Debug)]
 pub struct ReportPage<'a> {
     /// What the page is about, such as the mesh's file name.
@@ -39,7 +39,7 @@ pub struct ReportPage<'a> {
     pub pictures: Vec<(String, Picture)>,
     /// Tables of names and values: options, times.
     pub tables: Vec<(String, Vec<(String, String)>)>,
-    /// What was odd.
+    /// Warnings.
     pub warnings: Vec<String>,
 }
 
@@ -83,7 +83,7 @@ impl ReportPage<'_> {
         Ok(out)
     }
 
-    /// The few figures that a reader looks for first.
+    /// The figures that a reader looks for first.
     fn key_figures(&self, out: &mut String) {
         let (shape, alignment) = (&self.report.shape, &self.report.alignment);
         let cells = if self.dimension == 2 { "triangles" } else { "tetrahedra" };
@@ -153,7 +153,7 @@ fn figure_table(out: &mut String, table: &Table) {
     out.push_str("</table>\n");
 }
 
-/// A picture inside the page: as SVG, which stays sharp, unless it would be large.
+/// A picture inside the page, as SVG, which stays sharp, or as PNG if that is smaller.
 fn embed(out: &mut String, caption: &str, picture: &Picture) -> Result<(), DrawError> {
     let (format, kind) = if picture.shape_count() <= FEW_SHAPES {
         (PictureFormat::Svg, "svg+xml")

@@ -8,7 +8,7 @@ use atomesh::watch::Silent;
 
 use super::chart::Chart;
 use super::*;
-use crate::{Style, draw_flat};
+use crate::{Style, draw_triangles};
 
 fn square() -> Mesh<2> {
     let points = vec![[0.0, 0.0], [8.0, 0.0], [8.0, 8.0], [0.0, 8.0]];
@@ -20,7 +20,7 @@ fn page_text() -> String {
     let size = WantedSize::from(8.0);
     let report = MeshReport::new(&square(), &grid, &[0.0; 81], size, &mut Silent).unwrap();
     let image = Image::new(Frame::new([9, 9]).unwrap(), Samples::U8((0..81).collect())).unwrap();
-    let picture = draw_flat(&image, &square(), &Style::default()).unwrap();
+    let picture = draw_triangles(&image, &square(), &Style::default()).unwrap();
     let page = ReportPage {
         title: "a<b & \"c\".vtu".into(),
         subtitle: "two cells".into(),

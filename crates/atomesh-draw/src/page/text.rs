@@ -1,6 +1,6 @@
-//! Text and numbers as HTML shows them.
+//! Text and numbers in HTML.
 
-/// The text with the letters that HTML gives a meaning spelt out.
+/// The text with HTML's special characters escaped.
 pub(super) fn escape(text: &str) -> String {
     let mut out = String::with_capacity(text.len());
     for letter in text.chars() {
@@ -29,7 +29,7 @@ pub(super) fn grouped(count: u64) -> String {
     out
 }
 
-/// A real number with four digits, or as many as it takes to be whole.
+/// A number with four significant digits, or all digits of its whole part.
 pub(super) fn real(x: f64) -> String {
     if x == 0.0 {
         return "0".into();

@@ -4,7 +4,7 @@ use std::path::Path;
 
 use atomesh::image::{Frame, Image, Samples, Units};
 use atomesh::mesh::Mesh;
-use atomesh_draw::{DrawError, Picture, PictureFormat, Style, draw_flat, draw_slices};
+use atomesh_draw::{DrawError, Picture, PictureFormat, Style, draw_slices, draw_triangles};
 use proptest::prelude::*;
 
 /// The pixels of a PNG, row by row.
@@ -49,7 +49,7 @@ fn empty<const D: usize>() -> Mesh<D> {
 #[test]
 fn samples_are_squares_with_row_zero_on_top() {
     let style = Style { max_side: 80.0, brightness: 1.0, ..Style::default() };
-    let pixels = Pixels::of(&draw_flat(&slope(8, 4), &empty(), &style).unwrap());
+    let pixels = Pixels::of(&draw_triangles(&slope(8, 4), &empty(), &style).unwrap());
     assert_eq!((pixels.width, pixels.height), (80, 40));
     for j in 0..4 {
         for i in 0..8 {
@@ -66,7 +66,7 @@ fn samples_are_squares_with_row_zero_on_top() {
 #[test]
 fn edges_run_between_the_centres_of_samples() {
     let style = Style { max_side: 90.0, edge_pixels: 1000.0, edge_width: 3.0, ..Style::default() };
-    let pixels = Pixels::of(&draw_flat(&slope(9, 9), &square(9, 9), &style).unwrap());
+    let pixels = Pixels::of(&draw_triangles(&slope(9, 9), &square(9, 9), &style).unwrap());
     // ten pixels to a sample: the corners are at 5 and 85
     for (x, y) in [(5.0, 5.0), (85.0, 5.0), (45.0, 5.0), (5.0, 45.0), (45.0, 45.0), (45.0, 85.0)] {
         assert!(pixels.at(x, y)[0] > 200, "no edge at {x}, {y}: {:?}", pixels.at(x, y));
@@ -84,10 +84,10 @@ fn an_edge_has_the_wanted_length_in_true_proportions() {
     // cells two samples wide along x, one millimetre: the median edge is 1 mm
     let points = vec![[0.0, 0.0], [2.0, 0.0], [0.0, 0.5], [4.0, 0.0]];
     let mesh = Mesh::new(points, vec![0, 1, 2]).unwrap();
-    let picture = draw_flat(&image, &mesh, &Style::default()).unwrap();
+    let picture = draw_triangles(&image, &mesh, &Style::default()).unwrap();
     assert_eq!((picture.width(), picture.height()), (300, 800)); // 15 × 40 mm, 20 pixels a mm
     let style = Style { units: Units::Samples, max_side: 600.0, ..Style::default() };
-    let picture = draw_flat(&image, &empty(), &style).unwrap();
+    let picture = draw_triangles(&image, &empty(), &style).unwrap();
     assert_eq!((picture.width(), picture.height()), (600, 400));
 }
 
@@ -97,19 +97,19 @@ fn outliers_and_missing_samples_leave_the_greys_as_they_are() {
     (samples[3], samples[500], samples[999]) = (f32::NAN, 1e30, f32::NEG_INFINITY);
     let image = Image::new(Frame::new([100, 10]).unwrap(), Samples::F32(samples)).unwrap();
     let style = Style { max_side: 100.0, brightness: 1.0, ..Style::default() };
-    let pixels = Pixels::of(&draw_flat(&image, &empty(), &style).unwrap());
+    let pixels = Pixels::of(&draw_triangles(&image, &empty(), &style).unwrap());
     assert_eq!(pixels.at(0.5, 0.5), [0; 3]);
     assert_eq!(pixels.at(9.5, 0.5), [255; 3]);
     assert_eq!(pixels.at(3.5, 0.5), [0; 3]); // not a number
     let flat = Image::new(Frame::new([4, 4]).unwrap(), Samples::U8(vec![7; 16])).unwrap();
-    let pixels = Pixels::of(&draw_flat(&flat, &empty(), &style).unwrap());
+    let pixels = Pixels::of(&draw_triangles(&flat, &empty(), &style).unwrap());
     assert_eq!(pixels.at(50.0, 50.0), [128; 3]);
 }
 
 #[test]
 fn svg_draws_each_edge_once_over_the_embedded_image() {
     let style = Style { atoms: true, max_side: 90.0, edge_pixels: 1000.0, ..Style::default() };
-    let picture = draw_flat(&slope(9, 9), &square(9, 9), &style).unwrap();
+    let picture = draw_triangles(&slope(9, 9), &square(9, 9), &style).unwrap();
     let svg = String::from_utf8(picture.encode(PictureFormat::Svg).unwrap()).unwrap();
     assert!(
         svg.starts_with("<svg xmlns=\"http://www.w3.org/2000/svg\" width=\"90\" height=\"90\"")
@@ -255,11 +255,14 @@ fn places_and_styles_without_a_meaning_are_refused() {
     assert_eq!(slice.to_string(), "slice 5 along axis 1 of an image with 5 samples");
     for value in [0.0, -1.0, f64::NAN, 1.5] {
         let style = Style { brightness: value, ..Style::default() };
-        let refused = draw_flat(&slope(4, 4), &empty(), &style).unwrap_err();
+        let refused = draw_triangles(&slope(4, 4), &empty(), &style).unwrap_err();
         assert!(refused.to_string().starts_with("brightness is "), "{refused}");
     }
     let unknown = PictureFormat::of(Path::new("a.gif")).unwrap_err();
-    assert_eq!(unknown.to_string(), "\"a.gif\" is no picture by its name; expected .png or .svg");
+    assert_eq!(
+        unknown.to_string(),
+        "\"a.gif\" is not the name of a picture; expected .png or .svg"
+    );
     assert_eq!(PictureFormat::of(Path::new("a.SVG")), Ok(PictureFormat::Svg));
 }
 

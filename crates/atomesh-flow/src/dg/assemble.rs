@@ -1,7 +1,7 @@
-//! The equations: which cells each cell's rows name, and their values.
+//! The matrix: the columns of each cell's rows, and their values.
 //!
-//! Each cell gathers its own rows from its facets, so that cells can be done at the same time and sums have a fixed
-//! order, at the cost of looking at every facet from both sides.
+//! Each cell gathers its own rows from its facets, so that cells can be done in parallel and sums have a fixed
+//! order. The price is that every facet is evaluated from both sides.
 
 use std::ops::Range;
 
@@ -13,9 +13,9 @@ use super::interface::{Interface, Side, product};
 use super::scheme::Scheme;
 use crate::solve::Sparse;
 
-/// Cells whose rows are made in one go.
+/// Cells whose rows are made by one task.
 const BLOCK: usize = 256;
-/// Blocks between two looks at the watch.
+/// Blocks between two steps of the watch.
 const STRIDE: usize = 64;
 
 /// Rows of consecutive cells.
@@ -74,8 +74,8 @@ fn rows<const D: usize>(scheme: &Scheme<'_, D>, cells: Range<usize>) -> Rows {
     rows
 }
 
-/// The cells that a cell's rows name, ascending, itself among them: those beyond facets that something flows
-/// through, and those of the same wells of given pressure.
+/// The cells to which a cell is coupled, ascending, itself included: those beyond open facets, and those of the same
+/// wells of given pressure.
 fn find_beside<const D: usize>(scheme: &Scheme<'_, D>, cell: usize, beside: &mut Vec<u32>) {
     beside.clear();
     beside.push(cell as u32);
@@ -91,7 +91,7 @@ fn find_beside<const D: usize>(scheme: &Scheme<'_, D>, cell: usize, beside: &mut
     beside.dedup();
 }
 
-/// Fills a cell's rows, each as wide as the functions of the cells `beside`.
+/// Fills a cell's rows, whose columns are the functions of the cells `beside`.
 fn fill<const D: usize>(scheme: &Scheme<'_, D>, cell: usize, beside: &[u32], rows: &mut [f64]) {
     let count = scheme.element.count();
     let width = beside.len() * count;
@@ -104,13 +104,14 @@ fn fill<const D: usize>(scheme: &Scheme<'_, D>, cell: usize, beside: &[u32], row
         let flow = product(&tensor, &affine.gradients[a]);
         affine.gradients.map(|gradient| measure * atomesh::geometry::dot(&flow, &gradient))
     });
-    // each row from the cell's own column on: the last row may end there
+    // slices start at the cell's own columns, so the last row may be shorter than `width`
     scheme.element.add_stiffness(&metric, &mut rows[own..], width);
     for &facet in scheme.grid.facets_of(cell) {
         if let Some(interface) = &scheme.interfaces[facet as usize] {
             let mine = interface.side_of(cell as u32);
             for side in interface.sides() {
-                add_interface(scheme, interface, (mine, side), &mut rows[at(side.cell)..], width);
+                let coupling = Coupling { interface, mine, other: side };
+                add_coupling(scheme, &coupling, &mut rows[at(side.cell)..], width);
             }
         }
     }
@@ -124,14 +125,21 @@ fn fill<const D: usize>(scheme: &Scheme<'_, D>, cell: usize, beside: &[u32], row
     rows[own] += scheme.pin(cell as u32);
 }
 
-/// Adds what the functions of the second side do to the equations of the first.
-fn add_interface<const D: usize>(
+/// Two sides of an interface, which may be the same.
+struct Coupling<'a, const D: usize> {
+    interface: &'a Interface<D>,
+    mine: &'a Side<D>,
+    other: &'a Side<D>,
+}
+
+/// Adds the terms of the other side's functions to the equations of mine.
+fn add_coupling<const D: usize>(
     scheme: &Scheme<'_, D>,
-    interface: &Interface<D>,
-    (mine, other): (&Side<D>, &Side<D>),
+    coupling: &Coupling<'_, D>,
     rows: &mut [f64],
     width: usize,
 ) {
+    let Coupling { interface, mine, other } = coupling;
     let count = scheme.element.count();
     let (own, from) = (scheme.element.trace(mine.trace), scheme.element.trace(other.trace));
     let (mut own_slopes, mut slopes) = ([0.0; MOST], [0.0; MOST]);

@@ -1,14 +1,14 @@
-//! What solving leaves unbalanced, sent away.
+//! Corrects the fluxes so that every cell balances.
 //!
-//! Equations are solved to rounding, or to a tolerance, of pressures; where little flows beside what pressures could
-//! move, as through a sealing layer, that can be much of the flow. So each cell's excess, what comes in less what goes
-//! out, is passed on from neighbour to neighbour, on a shortest way, to where it may leave: a facet of given
-//! pressure or a well of given pressure. In a compartment with neither the excesses sum to 0, and what is left to its
-//! pinned cell is rounding. Fluxes change by no more than the excesses, the residual of the equations, sum to.
+//! Equations are solved to rounding, or to a tolerance, of the pressures. Where little flows compared with what the
+//! pressures could drive, as through a sealing layer, this error can be a large part of the flow. So each cell's excess,
+//! inflow less outflow, is passed from neighbour to neighbour, on a shortest path, to where it may leave: a facet or a
+//! well of given pressure. In a compartment with neither, the excesses sum to 0, and its pinned cell is left with
+//! rounding. A flux changes by at most the sum of the excesses, which are the residual of the equations.
 
 use super::scheme::Scheme;
 
-/// Fluxes through facets, and what flows into cells by sources and wells together, and by wells of given pressure.
+/// Fluxes through facets, inflow of cells from sources and wells, and rates of wells of given pressure.
 pub(super) struct Flows {
     pub fluxes: Vec<f64>,
     pub sources: Vec<f64>,
@@ -43,15 +43,15 @@ pub(super) fn balance<const D: usize>(scheme: &Scheme<'_, D>, flows: &mut Flows)
 /// Where a cell's excess goes.
 #[derive(Clone, Copy, Debug, PartialEq)]
 enum Way {
-    /// Not known yet, or nowhere.
+    /// Unknown yet, or nowhere.
     None,
     /// Through a facet.
     Facet(u32),
-    /// Into a well of given pressure, or that which pins the pressure.
+    /// Into a well of given pressure, or that which pins the pressure of a compartment.
     Well,
 }
 
-/// The way of each cell, and the cells in an order in which each comes after that to which it passes its excess.
+/// The way of each cell, and the cells in an order in which each comes after the one that its excess goes to.
 fn ways<const D: usize>(scheme: &Scheme<'_, D>) -> (Vec<u32>, Vec<Way>) {
     let mut ways = vec![Way::None; scheme.grid.cell_count()];
     let mut order: Vec<u32> = Vec::with_capacity(ways.len());
@@ -85,7 +85,7 @@ fn ways<const D: usize>(scheme: &Scheme<'_, D>) -> (Vec<u32>, Vec<Way>) {
     (order, ways)
 }
 
-/// Lets the excess of a cell go into its well of given pressure.
+/// Gives the excess of a cell to its well of given pressure.
 fn leave<const D: usize>(scheme: &Scheme<'_, D>, flows: &mut Flows, cell: usize, excess: f64) {
     if let Some(well) = scheme.pressure_wells_of(cell as u32).next() {
         flows.sources[cell] -= excess;

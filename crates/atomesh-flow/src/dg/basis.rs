@@ -1,17 +1,17 @@
 //! Polynomials on a simplex, orthonormal in the mean.
 //!
-//! The functions are of ascending degree, the first is 1: the first coefficient of a pressure is its mean over the
-//! cell, and the equation tested by the first function is the cell's mass balance. Since `mean(φ_i φ_j) = δ_ij` on every
-//! cell, whatever its size and shape, the size of a mesh only scales the equations.
+//! The functions are of ascending degree, and the first is 1. So the first coefficient of a pressure is its mean over the
+//! cell, and the equation tested by the first function is the cell's mass balance. Since `mean(φ_i φ_j) = δ_ij` on a
+//! cell of any size and shape, the size of a mesh only scales the equations.
 //!
-//! Made from monomials in barycentric coordinates less those of the centroid, by Gram and Schmidt's method, twice, since
-//! once loses digits.
+//! Made from monomials in barycentric coordinates relative to the centroid, by Gram–Schmidt, applied twice against
+//! loss of digits.
 
 use atomesh::geometry::Point;
 
 use super::quadrature::Rule;
 
-/// The most functions: cubic in space.
+/// The largest number of functions: cubic in space.
 pub(super) const MOST: usize = 20;
 
 /// An orthonormal basis of the polynomials up to an order, in coordinates ξ: the barycentric coordinates of all corners
@@ -63,7 +63,7 @@ impl<const D: usize> Basis<D> {
         self.order
     }
 
-    /// How many functions.
+    /// The number of functions.
     pub fn count(&self) -> usize {
         self.powers.len()
     }
@@ -100,7 +100,7 @@ impl<const D: usize> Basis<D> {
         let count = self.count();
         let mut values = [0.0; MOST];
         for (number, row) in self.coefficients.chunks_exact(count).enumerate() {
-            // a function has no monomials beyond its own
+            // a function is made of monomials up to its own
             values[number] = (0..=number).map(|k| row[k] * monomials[k]).sum();
         }
         values

@@ -1,4 +1,4 @@
-//! The smooth part of the answer: continuous piecewise linear functions, cut at barriers (Dobrev et al. 2006).
+//! The coarse space for solving: continuous piecewise linear functions, cut at barriers (Dobrev et al. 2006).
 
 use atomesh::geometry::Sets;
 
@@ -7,8 +7,8 @@ use super::element::Element;
 use super::scheme::Scheme;
 use crate::solve::Sparse;
 
-/// The matrix that turns values at points into coefficients. A point beside barriers has a value for each set of cells
-/// around it that are joined by facets without one. Cost: O(cells).
+/// The matrix from values at points to coefficients. A point on barriers has a value for each set of cells around it
+/// that facets without a barrier connect. Cost: O(cells).
 pub(super) fn coarse<const D: usize>(scheme: &Scheme<'_, D>) -> Sparse {
     let (numbers, column_count) = values_at_corners(scheme);
     let parts = linear_parts(&scheme.element);
@@ -43,7 +43,7 @@ fn linear_parts<const D: usize>(element: &Element<D>) -> Vec<f64> {
     parts
 }
 
-/// The number of the value at each corner of each cell, and how many values there are.
+/// The number of the value at each corner of each cell, and the number of values.
 fn values_at_corners<const D: usize>(scheme: &Scheme<'_, D>) -> (Vec<u32>, usize) {
     let mesh = scheme.grid.mesh().expect("checked before");
     let corners = mesh.corners();

@@ -1,4 +1,4 @@
-//! What all cells share, on the reference simplex: values, slopes and their integrals; and what maps a cell to it.
+//! Tables that all cells share, on the reference simplex: values, slopes and their integrals; and the map of a cell to it.
 
 use atomesh::geometry::{Point, Simplex, difference};
 
@@ -90,12 +90,12 @@ pub(super) struct Element<const D: usize> {
     pub samples: Vec<[f64; MOST]>,
     /// The means of `∂_a φ_i ∂_b φ_j`: a, b, i, j from the slowest.
     stiffness: Vec<f64>,
-    /// By [`Element::trace_number`]; empty where two corners are one.
+    /// By [`Element::trace_number`]; empty for numbers that name a corner twice.
     traces: Vec<Trace>,
 }
 
 impl<const D: usize> Element<D> {
-    /// Of an order from 1 to 3.
+    /// The tables of an order from 1 to 3.
     pub fn new(order: usize) -> Self {
         let basis = Basis::new(order);
         let facet_rule = Rule::new(D, 2 * order);
@@ -107,7 +107,7 @@ impl<const D: usize> Element<D> {
         Self { basis, facet_rule, cell_rule, samples, stiffness, traces }
     }
 
-    /// How many functions there are.
+    /// The number of functions.
     pub fn count(&self) -> usize {
         self.basis.count()
     }

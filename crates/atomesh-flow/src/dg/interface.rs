@@ -1,4 +1,4 @@
-//! How pressures beside a facet make the flux through it.
+//! The flux through a facet from the pressures on its two sides.
 //!
 //! With n out of the first cell, the jump `[p] = p₁ − p₂` and the weighted mean `g = {k ∂p/∂n}`, the flux is
 //! `F = b [p] − a g`, and the equations hold the terms
@@ -7,24 +7,24 @@
 //! F(p) [v] ∓ a ([p] + ε g(p)) g(v)        − symmetric, + Oden, Babuška & Baumann
 //! ```
 //!
-//! in which ε is the resistance of a barrier, across which `[p] = −ε g`; 0 where there is none. Both are then consistent
-//! if `a + b ε = 1`. With s the inverse of the penalty σ:
+//! in which ε is the resistance of a barrier, across which `[p] = −ε g`; 0 without one. Both forms are consistent
+//! if `a + b ε = 1`. With s = 1/σ, σ the penalty:
 //!
-//! - symmetric: `a = s/(ε + s)`, `b = 1/(ε + s)` (Juntunen & Stenberg 2009), which is the interior penalty at ε = 0
-//!   (`a = 1`, `b = σ`) and no flow at ε = ∞, and is as stable for any ε between;
-//! - Oden, Babuška & Baumann: `b = ε/(ε + s)²`, `a = 1 − bε`, which is theirs at ε = 0 (`a = 1`, `b = 0`) and no flow at
-//!   ε = ∞. The terms with a cancel in the energy, but for `a ε g²`, and b is never below 0.
+//! - symmetric: `a = s/(ε + s)`, `b = 1/(ε + s)` (Juntunen & Stenberg 2009): the interior penalty at ε = 0
+//!   (`a = 1`, `b = σ`), no flow at ε = ∞, and as stable for any ε between;
+//! - Oden, Babuška & Baumann: `b = ε/(ε + s)²`, `a = 1 − bε`: their form at ε = 0 (`a = 1`, `b = 0`), no flow at
+//!   ε = ∞. The terms with a cancel in the energy, except `a ε g²`, and b is never below 0.
 //!
-//! The mean is weighted by the permeability of the other side, so that the penalty is by the harmonic mean of the
-//! two (Ern, Stephansen & Zunino 2009), and σ is such that the energy stays above 0, by the sharp inequality
-//! between a polynomial of degree p − 1 in a cell, such as its slope, and on a facet (Warburton & Hesthaven 2003):
-//! `‖w‖²_F ≤ p (p + D − 1)/D · |F|/|K| ‖w‖²_K`. Each of the D + 1 facets may take as much of a cell's energy.
+//! The mean is weighted by the permeability of the other side, so that the penalty grows with the harmonic mean of the
+//! two (Ern, Stephansen & Zunino 2009). σ keeps the energy positive. It follows from the sharp trace inequality for
+//! polynomials w of degree p − 1, such as a slope (Warburton & Hesthaven 2003),
+//! `‖w‖²_F ≤ p (p + D − 1)/D · |F|/|K| ‖w‖²_K`, summed over the D + 1 facets of a cell.
 
 use atomesh::geometry::{Point, difference, dot};
 
 use super::element::{Affine, Element};
-use super::{DgOptions, Form};
-use crate::grid::Grid;
+use super::options::{DgOptions, Form};
+use crate::grid::FlowGrid;
 use crate::permeability::Tensor;
 use crate::problem::Condition;
 use crate::setting::Setting;
@@ -42,7 +42,7 @@ pub(super) struct Side<const D: usize> {
     pub sign: f64,
 }
 
-/// A facet through which something flows because of pressures.
+/// A facet through which pressures drive a flux.
 #[derive(Clone, Debug)]
 pub(super) struct Interface<const D: usize> {
     /// The facet's area, or length.
@@ -73,7 +73,7 @@ impl<const D: usize> Interface<D> {
     }
 }
 
-/// What is known of one side before the two are weighed.
+/// One side of a facet before its weight is known.
 struct Flank<const D: usize> {
     cell: u32,
     trace: u32,
@@ -83,60 +83,88 @@ struct Flank<const D: usize> {
     permeability: f64,
     /// The centroid's distance from the facet.
     distance: f64,
-    /// What the penalty must be, were the weight 1.
+    /// The penalty for a weight of 1.
     penalty: f64,
 }
 
-/// Makes the interface of a facet; `None` where nothing flows because of pressures: sealed facets and those of the
-/// boundary on which the pressure is not given.
-pub(super) fn interface<const D: usize>(
-    grid: &Grid<D>,
-    setting: &Setting<'_, D>,
-    cells: &[Affine<D>],
-    options: &DgOptions,
-    number: usize,
-) -> Option<Interface<D>> {
-    if !is_open(grid, setting, number) {
-        return None;
-    }
-    let facet = &grid.facets()[number];
-    let flank = |cell: u32| flank(grid, setting, &cells[cell as usize], options, (number, cell));
-    let first = flank(facet.cell);
-    let second = facet.neighbour.map(flank);
-    let other = second.as_ref().map_or(0.0, |side| side.permeability);
-    let sum = first.permeability + other;
-    // the first side's weight: 1 on the boundary
-    let weight = if second.is_some() { other / sum } else { 1.0 };
-    let side = |flank: &Flank<D>, weight: f64, sign: f64| Side {
-        cell: flank.cell,
-        trace: flank.trace,
-        direction: flank.direction.map(|x| weight * x),
-        sign,
-    };
-    let penalty = |flank: &Flank<D>, weight: f64| weight * weight * flank.penalty;
-    let mut sigma = penalty(&first, weight);
-    let mut resistance = first.distance / first.permeability;
-    if let Some(second) = &second {
-        sigma += penalty(second, 1.0 - weight);
-        resistance += second.distance / second.permeability;
-    }
-    resistance *= 1.0 / setting.multipliers()[number] - 1.0;
-    let (slope_weight, jump_weight) = weights(options.form, 1.0 / sigma, resistance);
-    Some(Interface {
-        measure: facet.measure(),
-        slope_weight,
-        jump_weight,
-        resistance,
-        sign: if options.form == Form::InteriorPenalty { -1.0 } else { 1.0 },
-        first: side(&first, weight, 1.0),
-        second: second.map(|second| side(&second, 1.0 - weight, -1.0)),
-    })
+/// What interfaces are made from.
+pub(super) struct InterfaceMaker<'a, const D: usize> {
+    pub grid: &'a FlowGrid<D>,
+    pub setting: &'a Setting<'a, D>,
+    /// The map of each cell.
+    pub cells: &'a [Affine<D>],
+    pub options: &'a DgOptions,
 }
 
-fn is_open<const D: usize>(grid: &Grid<D>, setting: &Setting<'_, D>, facet: usize) -> bool {
-    match grid.facets()[facet].neighbour {
-        Some(_) => setting.multipliers()[facet] > 0.0,
-        None => matches!(setting.condition(facet), Some(Condition::Pressure(_))),
+impl<const D: usize> InterfaceMaker<'_, D> {
+    /// The interface of a facet; `None` where pressures drive no flux: sealed facets, and those of the boundary without a
+    /// given pressure.
+    pub fn interface(&self, facet: usize) -> Option<Interface<D>> {
+        if !self.is_open(facet) {
+            return None;
+        }
+        let own = &self.grid.facets()[facet];
+        let first = self.flank(facet, own.cell);
+        let second = own.neighbour.map(|cell| self.flank(facet, cell));
+        let other = second.as_ref().map_or(0.0, |side| side.permeability);
+        let sum = first.permeability + other;
+        // the first side's weight: 1 on the boundary
+        let weight = if second.is_some() { other / sum } else { 1.0 };
+        let penalty = |flank: &Flank<D>, weight: f64| weight * weight * flank.penalty;
+        let mut sigma = penalty(&first, weight);
+        let mut resistance = first.distance / first.permeability;
+        if let Some(second) = &second {
+            sigma += penalty(second, 1.0 - weight);
+            resistance += second.distance / second.permeability;
+        }
+        resistance *= 1.0 / self.setting.multipliers()[facet] - 1.0;
+        let form = self.options.form;
+        let (slope_weight, jump_weight) = weights(form, 1.0 / sigma, resistance);
+        Some(Interface {
+            measure: own.measure(),
+            slope_weight,
+            jump_weight,
+            resistance,
+            sign: if form == Form::InteriorPenalty { -1.0 } else { 1.0 },
+            first: first.side(weight, 1.0),
+            second: second.map(|second| second.side(1.0 - weight, -1.0)),
+        })
+    }
+
+    fn is_open(&self, facet: usize) -> bool {
+        match self.grid.facets()[facet].neighbour {
+            Some(_) => self.setting.multipliers()[facet] > 0.0,
+            None => matches!(self.setting.condition(facet), Some(Condition::Pressure(_))),
+        }
+    }
+
+    fn flank(&self, facet: usize, cell: u32) -> Flank<D> {
+        let Self { grid, setting, cells, options } = self;
+        let affine = &cells[cell as usize];
+        let measure = grid.facets()[facet].measure();
+        let normal = grid.facets()[facet].area.map(|x| x / measure);
+        let flow = product(&setting.permeability().tensor(cell as usize), &normal);
+        let permeability = dot(&normal, &flow);
+        let away = difference(&grid.facets()[facet].centroid, &affine.centroid);
+        let (order, dimension) = (options.order as f64, D as f64);
+        let trace_bound = order * (order + dimension - 1.0) / dimension * measure
+            / grid.measures()[cell as usize];
+        Flank {
+            cell,
+            trace: trace_of(grid, facet, cell),
+            direction: affine.gradients.map(|gradient| dot(&gradient, &flow)),
+            permeability,
+            distance: dot(&away, &normal).abs(),
+            penalty: options.penalty * (dimension + 1.0) * trace_bound * permeability,
+        }
+    }
+}
+
+impl<const D: usize> Flank<D> {
+    /// The side of a weight and a sign.
+    fn side(&self, weight: f64, sign: f64) -> Side<D> {
+        let direction = self.direction.map(|x| weight * x);
+        Side { cell: self.cell, trace: self.trace, direction, sign }
     }
 }
 
@@ -145,40 +173,15 @@ fn weights(form: Form, s: f64, resistance: f64) -> (f64, f64) {
     let sum = resistance + s;
     match form {
         Form::InteriorPenalty => (s / sum, 1.0 / sum),
-        // 1 − ε²/(ε + s)², without the difference of what is nearly equal
+        // a = 1 − ε²/(ε + s)², without cancellation
         Form::OdenBabuskaBaumann => {
             (s * (2.0 * resistance + s) / (sum * sum), resistance / (sum * sum))
         }
     }
 }
 
-fn flank<const D: usize>(
-    grid: &Grid<D>,
-    setting: &Setting<'_, D>,
-    affine: &Affine<D>,
-    options: &DgOptions,
-    (facet, cell): (usize, u32),
-) -> Flank<D> {
-    let measure = grid.facets()[facet].measure();
-    let normal = grid.facets()[facet].area.map(|x| x / measure);
-    let flow = product(&setting.permeability().tensor(cell as usize), &normal);
-    let permeability = dot(&normal, &flow);
-    let away = difference(&grid.facets()[facet].centroid, &affine.centroid);
-    let (order, dimension) = (options.order as f64, D as f64);
-    let trace_bound =
-        order * (order + dimension - 1.0) / dimension * measure / grid.measures()[cell as usize];
-    Flank {
-        cell,
-        trace: trace_of(grid, facet, cell),
-        direction: affine.gradients.map(|gradient| dot(&gradient, &flow)),
-        permeability,
-        distance: dot(&away, &normal).abs(),
-        penalty: options.penalty * (dimension + 1.0) * trace_bound * permeability,
-    }
-}
-
 /// The number of a cell's trace on a facet.
-pub(super) fn trace_of<const D: usize>(grid: &Grid<D>, facet: usize, cell: u32) -> u32 {
+pub(super) fn trace_of<const D: usize>(grid: &FlowGrid<D>, facet: usize, cell: u32) -> u32 {
     let mesh = grid.mesh().expect("checked before");
     let own = &mesh.corners()[cell as usize * (D + 1)..(cell as usize + 1) * (D + 1)];
     let facet = grid.facet_corners(facet).expect("facets of a mesh have corners");

@@ -1,4 +1,4 @@
-//! The right-hand side: what the source term, wells and the boundary bring.
+//! The right-hand side, from the source term, wells and the boundary.
 
 use atomesh::geometry::Point;
 use rayon::prelude::*;
@@ -7,14 +7,14 @@ use super::basis::MOST;
 use super::scheme::Scheme;
 use crate::problem::{Condition, Control, Value};
 
-/// The right-hand side, and the part of it that the source term and wells of given rate bring into each cell.
+/// The right-hand side, and the inflow of each cell from the source term and wells of given rate.
 pub(super) struct Loads {
     pub rhs: Vec<f64>,
     pub sources: Vec<f64>,
 }
 
-/// Makes the loads. In compartments whose pressure nothing fixes, what flows in by quadrature of the source term and
-/// of fluxes on the boundary sums to 0 only to the error of quadrature; the rest is taken off, evenly, as a source.
+/// Makes the loads. In compartments without a given pressure, the source term and the fluxes on the boundary sum to 0
+/// only to the error of quadrature; the excess is subtracted evenly, as a source.
 pub(super) fn loads<const D: usize>(scheme: &Scheme<'_, D>) -> Loads {
     let count = scheme.element.count();
     let cells = (0..scheme.grid.cell_count()).into_par_iter();
@@ -51,7 +51,7 @@ pub(super) fn loads<const D: usize>(scheme: &Scheme<'_, D>) -> Loads {
     Loads { rhs, sources }
 }
 
-/// Writes what the source term brings to a cell's equations; returns what it brings to the cell.
+/// Writes the source term's part of a cell's equations; returns the cell's inflow from it.
 fn add_source<const D: usize>(scheme: &Scheme<'_, D>, cell: usize, into: &mut [f64]) -> f64 {
     let measure = scheme.grid.measures()[cell];
     let field = match &scheme.setting.problem().source {
@@ -95,7 +95,7 @@ fn balance_pinned<const D: usize>(scheme: &Scheme<'_, D>, sources: &mut [f64]) {
     for (number, facet) in scheme.grid.facets().iter().enumerate() {
         if let Some(Condition::Flux(value)) = scheme.setting.condition(number) {
             excess[compartment_of[facet.cell as usize] as usize] +=
-                facet_integral(scheme, number, &value);
+                scheme.facet_integral(number, &value);
         }
     }
     for (cell, source) in sources.iter_mut().enumerate() {
@@ -104,17 +104,6 @@ fn balance_pinned<const D: usize>(scheme: &Scheme<'_, D>, sources: &mut [f64]) {
             *source -= excess[number] * scheme.grid.measures()[cell] / compartments[number].measure;
         }
     }
-}
-
-/// The integral of a value over a facet, by the rule of the equations.
-pub(super) fn facet_integral<const D: usize>(
-    scheme: &Scheme<'_, D>,
-    facet: usize,
-    value: &Value<'_, D>,
-) -> f64 {
-    let weights = scheme.element.facet_rule.weights.iter().enumerate();
-    let at = |(node, weight): (usize, &f64)| weight * value.at(&scheme.node(facet, node));
-    scheme.grid.facets()[facet].measure() * weights.map(at).sum::<f64>()
 }
 
 fn add_pressure<const D: usize>(

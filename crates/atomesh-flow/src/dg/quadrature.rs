@@ -1,10 +1,10 @@
 //! Quadrature on simplices by conical products of Gauss's rule (Stroud 1971, chapter 2).
 //!
-//! The cube is folded onto the simplex, `λ_k = t_1 ⋯ t_k (1 − t_{k+1})`; the fold's Jacobian is a polynomial in t, which
-//! Gauss's rule with a few more nodes integrates with the rest. All weights are above 0. Not the fewest nodes that
-//! there can be, but of any degree, and without tables.
+//! The cube is folded onto the simplex, `λ_k = t_1 ⋯ t_k (1 − t_{k+1})`. The fold's Jacobian is a polynomial in t, which
+//! Gauss's rule integrates exactly with a few more nodes. All weights are above 0. There are rules with fewer nodes, but
+//! this one is of any degree and needs no tables.
 
-/// Places in a simplex, and weights that sum to 1: the integral over the simplex's measure.
+/// Nodes in a simplex, and weights that sum to 1: the rule gives the mean over the simplex.
 #[derive(Clone, Debug)]
 pub(super) struct Rule {
     corners: usize,
@@ -54,7 +54,7 @@ impl Rule {
 }
 
 /// Gauss's nodes and weights on 0…1, exact up to degree 2 `count` − 1: the zeros of Legendre's polynomial by Newton's
-/// method from the usual guess (Abramowitz & Stegun 1964, 22.16.6), which needs few steps; ten are more than enough.
+/// method from the usual guess (Abramowitz & Stegun 1964, 22.16.6). Ten steps are more than enough.
 fn gauss(count: usize) -> (Vec<f64>, Vec<f64>) {
     let node = |number: usize| {
         let mut x = (std::f64::consts::PI * (number as f64 + 0.75) / (count as f64 + 0.5)).cos();

@@ -3,13 +3,13 @@
 use atomesh::geometry::{Point, dot};
 use rayon::prelude::*;
 
-use super::DgOptions;
+use super::basis::MOST;
 use super::element::{Affine, Element};
-use super::interface::{Interface, interface};
-use super::loads;
+use super::interface::{Interface, InterfaceMaker};
+use super::options::DgOptions;
 use crate::error::FlowError;
-use crate::grid::Grid;
-use crate::problem::{Condition, Control};
+use crate::grid::FlowGrid;
+use crate::problem::{Condition, Control, Value};
 use crate::setting::{Setting, well_index};
 
 /// A well of given pressure.
@@ -29,25 +29,25 @@ pub(super) struct PressureWell {
 
 /// Everything that the equations are made of.
 pub(super) struct Scheme<'a, const D: usize> {
-    pub grid: &'a Grid<D>,
+    pub grid: &'a FlowGrid<D>,
     pub setting: &'a Setting<'a, D>,
     pub element: Element<D>,
     pub cells: Vec<Affine<D>>,
-    /// By facet; `None` where nothing flows because of pressures.
+    /// By facet; `None` where pressures drive no flux.
     pub interfaces: Vec<Option<Interface<D>>>,
     pub pressure_wells: Vec<PressureWell>,
-    /// By compartment: pressures are solved for less this one, so that a large constant costs no digits.
+    /// By compartment: pressures are solved for relative to this one, so that a large constant costs no digits.
     pub references: Vec<f64>,
     /// Cells of wells of given pressure, ascending, each with the well's place in `pressure_wells`.
     well_cells: Vec<(u32, usize)>,
-    /// Cells in which a pressure is pinned, ascending, each with the index of the well that does it.
+    /// Cells in which a pressure is pinned, ascending, each with the index of the well that pins it.
     pins: Vec<(u32, f64)>,
 }
 
 impl<'a, const D: usize> Scheme<'a, D> {
-    /// Makes it, the mesh and options checked by the caller.
+    /// Makes the scheme; the caller has checked the options.
     pub fn new(
-        grid: &'a Grid<D>,
+        grid: &'a FlowGrid<D>,
         setting: &'a Setting<'a, D>,
         options: &DgOptions,
     ) -> Result<Self, FlowError> {
@@ -59,8 +59,8 @@ impl<'a, const D: usize> Scheme<'a, D> {
         };
         let cells: Vec<Affine<D>> = numbers.into_par_iter().map(affine).collect();
         let facets = (0..grid.facets().len()).into_par_iter();
-        let interfaces =
-            facets.map(|facet| interface(grid, setting, &cells, options, facet)).collect();
+        let maker = InterfaceMaker { grid, setting, cells: &cells, options };
+        let interfaces = facets.map(|facet| maker.interface(facet)).collect();
         let references = references(grid, setting);
         let pressure_wells = pressure_wells(setting, &references)?;
         let mut well_cells: Vec<(u32, usize)> = (pressure_wells.iter().enumerate())
@@ -106,18 +106,18 @@ impl<'a, const D: usize> Scheme<'a, D> {
         self.references[self.setting.compartment_of()[cell] as usize]
     }
 
-    /// What flows through a facet, out of its cell, if the pressures less their reference have these coefficients.
+    /// The flux through a facet, out of its cell, for these coefficients of the pressures relative to their references.
     pub fn flux(&self, facet: usize, coefficients: &[f64]) -> f64 {
         let Some(interface) = &self.interfaces[facet] else {
             return match self.setting.condition(facet) {
-                Some(Condition::Flux(value)) => -loads::facet_integral(self, facet, &value),
+                Some(Condition::Flux(value)) => -self.facet_integral(facet, &value),
                 _ => 0.0,
             };
         };
         let count = self.element.count();
         let (a, b) = (interface.slope_weight, interface.jump_weight);
         let mut sum = 0.0;
-        let mut slopes = [0.0; super::basis::MOST];
+        let mut slopes = [0.0; MOST];
         for (node, weight) in self.element.facet_rule.weights.iter().enumerate() {
             let (mut jump, mut slope) = (0.0, 0.0);
             for side in interface.sides() {
@@ -137,6 +137,13 @@ impl<'a, const D: usize> Scheme<'a, D> {
         sum * interface.measure
     }
 
+    /// The integral of a value over a facet, by the rule of the equations.
+    pub fn facet_integral(&self, facet: usize, value: &Value<'_, D>) -> f64 {
+        let weights = self.element.facet_rule.weights.iter().enumerate();
+        let at = |(node, weight): (usize, &f64)| weight * value.at(&self.node(facet, node));
+        self.grid.facets()[facet].measure() * weights.map(at).sum::<f64>()
+    }
+
     /// The reference pressure of a facet's cell.
     pub fn reference_of(&self, facet: usize) -> f64 {
         self.reference(self.grid.facets()[facet].cell as usize)
@@ -154,8 +161,8 @@ impl<'a, const D: usize> Scheme<'a, D> {
     }
 }
 
-/// The middle of the least and the greatest pressure that is given in each compartment; 0 without one.
-fn references<const D: usize>(grid: &Grid<D>, setting: &Setting<'_, D>) -> Vec<f64> {
+/// The middle between the least and the greatest given pressure of each compartment; 0 without one.
+fn references<const D: usize>(grid: &FlowGrid<D>, setting: &Setting<'_, D>) -> Vec<f64> {
     let mut ranges = vec![(f64::INFINITY, f64::NEG_INFINITY); setting.compartments().len()];
     let mut include = |cell: u32, pressure: f64| {
         let range = &mut ranges[setting.compartment_of()[cell as usize] as usize];

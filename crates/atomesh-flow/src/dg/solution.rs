@@ -1,4 +1,4 @@
-//! The answer: polynomials, and the fluxes between them.
+//! The solution: polynomials, and the fluxes between them.
 
 use atomesh::geometry::Point;
 use rayon::prelude::*;
@@ -10,13 +10,13 @@ use super::loads::place;
 use super::quadrature::Rule;
 use super::scheme::{Scheme, gradient, value};
 use crate::error::FlowError;
-use crate::grid::Grid;
+use crate::grid::FlowGrid;
 use crate::problem::Control;
 use crate::setting::well_index;
 use crate::solution::{Solution, WellFlow};
 use crate::solve::SolveReport;
 
-/// Flow by discontinuous Galerkin: what every scheme answers, and the pressure as a polynomial in each cell.
+/// Flow by discontinuous Galerkin: the solution that every scheme gives, and the pressure as a polynomial in each cell.
 #[derive(Clone, Debug)]
 pub struct DgSolution<const D: usize> {
     /// Mean pressures, fluxes, wells.
@@ -33,7 +33,7 @@ impl<const D: usize> DgSolution<D> {
         self.basis.order()
     }
 
-    /// The pressure of a cell's polynomial at a place, which should lie in the cell: elsewhere it means nothing.
+    /// The pressure of a cell's polynomial at a place in the cell; outside it has no meaning.
     ///
     /// # Panics
     /// If there is no such cell.
@@ -56,10 +56,10 @@ impl<const D: usize> DgSolution<D> {
     /// `includes` holds; by quadrature, exact for polynomials two degrees higher.
     ///
     /// # Panics
-    /// If the grid is another one than that solved on.
+    /// If the grid is not the one solved on.
     pub fn l2_distance(
         &self,
-        grid: &Grid<D>,
+        grid: &FlowGrid<D>,
         includes: impl Fn(usize) -> bool,
         exact: impl Fn(&Point<D>) -> f64,
     ) -> (f64, f64) {
@@ -84,7 +84,7 @@ impl<const D: usize> DgSolution<D> {
     }
 }
 
-/// Reads fluxes and wells off the coefficients of the pressures less their references, and puts the references back.
+/// Computes fluxes and wells from the coefficients of the pressures relative to their references, and adds the references.
 pub(super) fn conclude<const D: usize>(
     scheme: Scheme<'_, D>,
     mut coefficients: Vec<f64>,
@@ -119,7 +119,7 @@ pub(super) fn conclude<const D: usize>(
     Ok(DgSolution { solution, basis: element.basis, cells, coefficients })
 }
 
-/// What each well does; `rates` holds those of wells of given pressure.
+/// The flow of each well; `rates` holds those of wells of given pressure.
 fn wells<const D: usize>(
     scheme: &Scheme<'_, D>,
     pressures: &[f64],

@@ -1,4 +1,4 @@
-//! A problem placed on a grid: every name found, every compartment solvable.
+//! A problem placed on a grid: every name found, every compartment known to have a solution.
 
 mod wells;
 #[cfg(test)]
@@ -7,21 +7,21 @@ mod tests;
 use atomesh::geometry::Sets;
 
 use crate::error::FlowError;
-use crate::grid::{FlowFacet, Grid, cell_mean, facet_integral};
+use crate::grid::{FlowFacet, FlowGrid, cell_mean, facet_integral};
 use crate::permeability::Permeability;
 use crate::problem::{Condition, Control, Problem};
 use wells::place_wells;
 pub use wells::{PlacedWell, well_index};
 
-/// Rates that sum to less than this share of their magnitudes sum to 0.
+/// Rates whose sum is below this share of the sum of their magnitudes balance.
 const BALANCED: f64 = 1e-9;
 
 /// Cells between which something can flow.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Compartment {
-    /// How many cells.
+    /// The number of cells.
     pub cell_count: usize,
-    /// Their volume (area in 2-D).
+    /// Their area (plane) or volume (space).
     pub measure: f64,
     /// The lowest cell.
     pub first: u32,
@@ -44,7 +44,7 @@ impl Compartment {
     }
 }
 
-/// A problem placed on a grid, found to have an answer.
+/// A problem placed on a grid and known to have a solution.
 #[derive(Clone, Debug)]
 pub struct Setting<'a, const D: usize> {
     problem: &'a Problem<'a, D>,
@@ -58,15 +58,15 @@ pub struct Setting<'a, const D: usize> {
 
 impl<'a, const D: usize> Setting<'a, D> {
     /// Finds the facets and cells that the problem names, and the compartments that its sealed barriers
-    /// (multiplier 0) cut the grid into. Cost: O(cells), and as much for each well.
+    /// (multiplier 0) cut the grid into. Cost: O(cells · (1 + wells)).
     ///
-    /// A well in a place that more cells than one share, such as a point of the mesh, flows into all of them, as
-    /// far as no barrier lies between.
+    /// A well at a place that several cells share, such as a point of the mesh, flows into all of them that no
+    /// barrier separates from the lowest one.
     ///
     /// # Errors
-    /// [`FlowError`] names what is not found, out of range or not finite; and a compartment with a well, a flux or a
-    /// source, but no pressure, whose rates do not sum to 0.
-    pub fn new(problem: &'a Problem<'a, D>, grid: &Grid<D>) -> Result<Self, FlowError> {
+    /// [`FlowError`] names what is not found, out of range or not finite, and a compartment without a given pressure
+    /// whose rates do not sum to 0.
+    pub fn new(problem: &'a Problem<'a, D>, grid: &FlowGrid<D>) -> Result<Self, FlowError> {
         problem.permeability.check(grid.cell_count())?;
         let multipliers = multipliers(problem, grid)?;
         let conditions = conditions(problem, grid)?;
@@ -105,13 +105,13 @@ impl<'a, const D: usize> Setting<'a, D> {
         &self.multipliers
     }
 
-    /// The condition on a facet of the boundary, if there is one. `None` elsewhere: nothing flows.
+    /// The condition on a facet of the boundary; `None` without one, so that nothing flows.
     pub fn condition(&self, facet: usize) -> Option<Condition<'a, D>> {
         let number = self.conditions[facet]?;
         Some(self.problem.boundaries[number as usize].condition)
     }
 
-    /// The number in the problem of the condition on a facet of the boundary.
+    /// The problem's number of the condition on a facet of the boundary.
     ///
     /// # Panics
     /// If there is none.
@@ -129,7 +129,7 @@ impl<'a, const D: usize> Setting<'a, D> {
         &self.compartments
     }
 
-    /// The compartments whose pressure nothing fixes, each with the cell in which schemes make its mean 0.
+    /// The compartments whose pressure nothing fixes, each with the cell whose mean pressure schemes set to 0.
     pub fn pinned(&self) -> impl Iterator<Item = (usize, u32)> + '_ {
         let all = self.compartments.iter().enumerate();
         all.filter(|(_, own)| !own.has_pressure).map(|(number, own)| (number, own.first))
@@ -140,12 +140,12 @@ impl<'a, const D: usize> Setting<'a, D> {
         &self.compartment_of
     }
 
-    /// What the source term brings into each cell, wells apart.
+    /// What the source term q brings into each cell, without wells.
     pub fn sources(&self) -> &[f64] {
         &self.sources
     }
 
-    fn find_compartments(&self, grid: &Grid<D>) -> Vec<Compartment> {
+    fn find_compartments(&self, grid: &FlowGrid<D>) -> Vec<Compartment> {
         let count = self.compartment_of.iter().max().map_or(0, |&most| most as usize + 1);
         let none = Compartment {
             cell_count: 0,
@@ -183,7 +183,7 @@ impl<'a, const D: usize> Setting<'a, D> {
         all
     }
 
-    fn check_balance(&self, grid: &Grid<D>) -> Result<(), FlowError> {
+    fn check_balance(&self, grid: &FlowGrid<D>) -> Result<(), FlowError> {
         let whole: f64 = grid.measures().iter().sum();
         for (number, compartment) in self.compartments.iter().enumerate() {
             if compartment.has_pressure || compartment.is_balanced() {
@@ -200,8 +200,8 @@ impl<'a, const D: usize> Setting<'a, D> {
         Ok(())
     }
 
-    /// What lies in a compartment, in words.
-    fn inside(&self, grid: &Grid<D>, compartment: u32) -> String {
+    /// Names of the wells and boundaries of a compartment.
+    fn inside(&self, grid: &FlowGrid<D>, compartment: u32) -> String {
         let within = |cell: u32| self.compartment_of[cell as usize] == compartment;
         let wells = self.wells.iter().filter(|placed| within(placed.cells[0]));
         let mut names: Vec<&str> =
@@ -223,7 +223,7 @@ impl<'a, const D: usize> Setting<'a, D> {
 
 fn multipliers<const D: usize>(
     problem: &Problem<'_, D>,
-    grid: &Grid<D>,
+    grid: &FlowGrid<D>,
 ) -> Result<Vec<f64>, FlowError> {
     let mut multipliers = vec![1.0; grid.facets().len()];
     for barrier in &problem.barriers {
@@ -244,7 +244,7 @@ fn multipliers<const D: usize>(
 
 fn conditions<const D: usize>(
     problem: &Problem<'_, D>,
-    grid: &Grid<D>,
+    grid: &FlowGrid<D>,
 ) -> Result<Vec<Option<u32>>, FlowError> {
     let mut conditions = vec![None; grid.facets().len()];
     for (number, boundary) in problem.boundaries.iter().enumerate() {
@@ -269,7 +269,10 @@ fn conditions<const D: usize>(
     Ok(conditions)
 }
 
-fn facets_named<'g, const D: usize>(grid: &'g Grid<D>, name: &str) -> Result<&'g [u32], FlowError> {
+fn facets_named<'g, const D: usize>(
+    grid: &'g FlowGrid<D>,
+    name: &str,
+) -> Result<&'g [u32], FlowError> {
     match grid.sets().iter().find(|set| set.name == name) {
         Some(set) => Ok(&set.facets),
         None => {
@@ -281,7 +284,7 @@ fn facets_named<'g, const D: usize>(grid: &'g Grid<D>, name: &str) -> Result<&'g
 }
 
 /// The compartment of each cell, numbered in the order of their lowest cells.
-fn compartments<const D: usize>(grid: &Grid<D>, multipliers: &[f64]) -> Vec<u32> {
+fn compartments<const D: usize>(grid: &FlowGrid<D>, multipliers: &[f64]) -> Vec<u32> {
     let mut sets = Sets::new(grid.cell_count());
     for (facet, &multiplier) in grid.facets().iter().zip(multipliers) {
         if let Some(other) = facet.neighbour.filter(|_| multiplier > 0.0) {

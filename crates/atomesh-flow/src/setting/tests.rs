@@ -5,7 +5,7 @@ use super::*;
 use crate::problem::{Barrier, Boundary, Value, Well};
 
 /// A unit square of 2 × n triangles, cut at x = 1/2 by the group `wall`.
-fn strip() -> Grid<2> {
+fn strip() -> FlowGrid<2> {
     let points = (0..6).map(|i| [0.5 * f64::from(i / 2), f64::from(i % 2)]).collect();
     let mesh = Mesh::new(points, vec![0, 2, 1, 2, 3, 1, 2, 4, 3, 4, 5, 3]).unwrap();
     let wall = FacetGroup { id: 9, name: "wall".to_string(), facets: vec![[2, 3]] };
@@ -13,7 +13,7 @@ fn strip() -> Grid<2> {
     let tags = Tags::sides(&mesh, &bounds, 1e-9)
         .merge(Tags::new(&mesh, vec![wall], None).unwrap())
         .unwrap();
-    Grid::of_mesh(&mesh, &tags)
+    FlowGrid::of_mesh(&mesh, &tags)
 }
 
 fn well(name: &str, x: f64, rate: f64) -> Well<2> {

@@ -5,7 +5,7 @@ use std::f64::consts::PI;
 use atomesh::geometry::Sets;
 
 use crate::error::FlowError;
-use crate::grid::Grid;
+use crate::grid::FlowGrid;
 use crate::problem::{Control, Problem, Well};
 
 /// A well with the cells that it flows into.
@@ -13,9 +13,9 @@ use crate::problem::{Control, Problem, Well};
 pub struct PlacedWell {
     /// The well's number in the problem.
     pub well: usize,
-    /// The cells that hold its place, ascending, of one compartment; what flows is spread over their volume.
+    /// The cells that hold its place, ascending, all of one compartment. The well's rate is spread over their volume.
     pub cells: Vec<u32>,
-    /// The volume of the cells (area in 2-D).
+    /// The area (plane) or volume (space) of the cells.
     pub measure: f64,
     /// The mean of the cells' permeabilities, by volume.
     pub permeability: f64,
@@ -27,7 +27,7 @@ pub struct PlacedWell {
 /// [`FlowError`] names a well outside the mesh, or with a number that is not finite.
 pub(super) fn place_wells<const D: usize>(
     problem: &Problem<'_, D>,
-    grid: &Grid<D>,
+    grid: &FlowGrid<D>,
     multipliers: &[f64],
 ) -> Result<Vec<PlacedWell>, FlowError> {
     let place = |(number, well): (usize, &Well<D>)| {
@@ -54,8 +54,8 @@ pub(super) fn place_wells<const D: usize>(
     problem.wells.iter().enumerate().map(place).collect()
 }
 
-/// The cells that can be reached from the lowest one through facets between them that are no barrier.
-fn one_side<const D: usize>(grid: &Grid<D>, multipliers: &[f64], cells: Vec<u32>) -> Vec<u32> {
+/// The cells that can be reached from the lowest one through facets without a barrier.
+fn one_side<const D: usize>(grid: &FlowGrid<D>, multipliers: &[f64], cells: Vec<u32>) -> Vec<u32> {
     let mut sets = Sets::new(cells.len());
     for (at, &cell) in cells.iter().enumerate() {
         for &facet in grid.facets_of(cell as usize) {
@@ -72,9 +72,10 @@ fn one_side<const D: usize>(grid: &Grid<D>, multipliers: &[f64], cells: Vec<u32>
 }
 
 impl PlacedWell {
-    /// The radius at which the pressure around the well is the mean of its cells, for a scheme that spreads what
-    /// flows over them: of a disk of their area A, R = √(A/π), e^(−1/4) R; of a ball of their volume, 5R/6. Follows
-    /// from `−k∇²p = q/A` within the disk or ball, and the field of a line or point outside.
+    /// The radius at which the pressure around the well is the mean of its cells, for a scheme that spreads the rate
+    /// over them. In the plane e^(−1/4) R, R = √(A/π) the radius of a disk of their area A; in space 5R/6, R that of a
+    /// ball of their volume. Follows from `−k∇²p = q/A` within the disk or ball and the field of a line or point source
+    /// outside.
     pub fn equivalent_radius<const D: usize>(&self) -> f64 {
         if D == 2 {
             (-0.25_f64).exp() * (self.measure / PI).sqrt()
@@ -84,8 +85,8 @@ impl PlacedWell {
     }
 }
 
-/// The rate of a well per unit of pressure between its wall, of radius `wall`, and the radius `equivalent`: in 2-D
-/// `2πk / ln(r_e/r_w)`, in 3-D `4πk / (1/r_w − 1/r_e)`.
+/// The rate of a well per unit of pressure difference between its wall, of radius r_w = `wall`, and the radius
+/// r_e = `equivalent`: `2πk / ln(r_e/r_w)` in the plane, `4πk / (1/r_w − 1/r_e)` in space.
 ///
 /// # Errors
 /// [`FlowError::WellRadius`] unless 0 < wall < equivalent.

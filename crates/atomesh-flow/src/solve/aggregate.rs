@@ -1,6 +1,6 @@
-//! Which unknowns join in one of the next level, and how that one interpolates to them.
+//! Aggregates of unknowns, which are the unknowns of the next level, and the interpolation from these.
 
-use super::Sparse;
+use super::sparse::Sparse;
 
 /// Unknowns are strongly coupled if `|a_ij| > θ √(a_ii a_jj)`, θ halved from level to level (Vaněk, Mandel & Brezina
 /// 1996).
@@ -8,7 +8,7 @@ const STRONG: f64 = 0.08;
 
 /// Unknowns in groups.
 pub struct Aggregates {
-    /// How many.
+    /// The number of aggregates.
     pub count: usize,
     /// The aggregate of each unknown.
     pub of: Vec<u32>,
@@ -41,8 +41,8 @@ impl<'a> Strong<'a> {
     }
 }
 
-/// Joins unknowns: first whole neighbourhoods that are free, then what is left with the neighbour it is coupled to most
-/// strongly, last the rest among themselves.
+/// Joins unknowns: first whole neighbourhoods of free unknowns, then each unknown left with its most strongly coupled
+/// neighbour in one of these, last the rest among themselves.
 pub fn aggregates(matrix: &Sparse, level: usize) -> Aggregates {
     let strong = Strong::new(matrix, level);
     let mut of = vec![NONE; matrix.row_count()];
@@ -81,8 +81,8 @@ fn join(strong: &Strong<'_>, of: &mut [u32], row: usize, number: u32) {
     }
 }
 
-/// Interpolation from aggregates: `(I − ω D⁻¹ A) T`, T 1 for each unknown at its aggregate, A without its weak
-/// couplings, which are added to the diagonal, and ω = 4 / (3 max Σ|a_ij| / a_ii).
+/// Interpolation from aggregates: `(I − ω D⁻¹ A) T`, T being 1 for each unknown at its aggregate, A without its weak
+/// couplings, which are added to the diagonal D, and ω = 4 / (3 max Σ|a_ij| / a_ii).
 pub fn smoothed(matrix: &Sparse, joined: &Aggregates, level: usize) -> Sparse {
     let strong = Strong::new(matrix, level);
     let count = matrix.row_count();
@@ -120,7 +120,7 @@ pub fn smoothed(matrix: &Sparse, joined: &Aggregates, level: usize) -> Sparse {
     Sparse::new(joined.count, starts, columns, values)
 }
 
-/// The diagonal with the weak couplings added; as it is where they would take most of it.
+/// The diagonal with the weak couplings added, unless they would cancel most of it.
 fn lumped(strong: &Strong<'_>, row: usize) -> f64 {
     let (columns, values) = strong.matrix.row(row);
     let (mut own, mut weak) = (0.0, 0.0);

@@ -1,10 +1,11 @@
-//! A matrix of small dense blocks, and sweeps of Gauss and Seidel over them.
+//! A matrix of small dense blocks, and Gauss–Seidel sweeps over them.
 
 use rayon::prelude::*;
 
-use super::{SolveError, Sparse};
+use super::error::SolveError;
+use super::sparse::Sparse;
 
-/// Rows of blocks that one thread treats at a time.
+/// Rows of blocks per task.
 const ROWS: usize = 512;
 
 /// A square matrix by blocks of one size, row by row; the blocks' columns ascend.
@@ -110,7 +111,7 @@ impl Blocks {
         for row in (0..self.starts.len() - 1).rev() {
             rest.copy_from_slice(&b[row * size..(row + 1) * size]);
             self.subtract(self.starts[row]..self.starts[row + 1], x, rest);
-            // the block on the diagonal was taken away with the others
+            // `rest` includes the diagonal block's term, so x is corrected
             self.add_inverse(row, rest, &mut x[row * size..(row + 1) * size]);
         }
     }
@@ -140,7 +141,7 @@ impl Blocks {
     }
 }
 
-/// The inverse of a small matrix by columns, by Gauss and Jordan's elimination with row pivots; `None` if there is none.
+/// The inverse of a small matrix by columns, by Gauss–Jordan elimination with row pivots; `None` if it is singular.
 fn inverse(block: &[f64], size: usize, inverse: &mut [f64]) -> Option<()> {
     let mut left = block.to_vec();
     inverse.fill(0.0);

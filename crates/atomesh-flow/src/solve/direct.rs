@@ -12,13 +12,15 @@ use faer::sparse::linalg::{LuError, qr};
 use faer::sparse::{FaerError, SparseColMatRef, SymbolicSparseColMatRef};
 use faer::{Conj, MatMut, Par, Side};
 
-use super::{Elimination, SolveError, Sparse};
+use super::error::SolveError;
+use super::order::Elimination;
+use super::sparse::Sparse;
 
-/// Bytes that factors take for each value of a Cholesky factor as counted, by measurement on meshes: with the rows'
-/// numbers and the space in which they are made, and twice as much without symmetry, where pivots add to it.
+/// Bytes per value of a Cholesky factor, of Cholesky and of LU, measured on meshes: with row numbers and workspace, and
+/// of LU with two factors and the fill of pivoting.
 const BYTES: (f64, f64) = (10.0, 24.0);
 
-/// A matrix as faer's arrays: read by columns it is the transpose.
+/// A matrix as faer's arrays; read by columns, as faer does, it is the transpose.
 struct Arrays<'a> {
     starts: Vec<u32>,
     matrix: &'a Sparse,
@@ -39,7 +41,7 @@ impl<'a> Arrays<'a> {
     }
 }
 
-/// Factors of a matrix, by which equations are solved as often as wanted.
+/// Factors of a matrix.
 pub enum Factors {
     /// `L Lᵀ`.
     Cholesky(Cholesky),
@@ -48,7 +50,7 @@ pub enum Factors {
 }
 
 impl Factors {
-    /// Factors a square matrix, a Cholesky factor if it `is_symmetric`.
+    /// Factors a square matrix: Cholesky if it `is_symmetric`, else LU.
     ///
     /// # Errors
     /// [`SolveError::Singular`] and [`SolveError::Memory`], the latter before more than `memory` bytes are taken.
@@ -83,7 +85,7 @@ impl Factors {
         }
     }
 
-    /// Which factors these are, in words.
+    /// The name of the factorization.
     pub fn name(&self) -> &'static str {
         match self {
             Self::Cholesky(_) => "Cholesky",
@@ -153,7 +155,7 @@ pub struct Lu {
 }
 
 impl Lu {
-    /// Columns in the given order but for subtrees of the column elimination tree, which are put together.
+    /// Columns are in the given order, made a postorder of the column elimination tree.
     fn new(matrix: &Sparse, order: &[u32]) -> Result<Self, SolveError> {
         let unknowns = matrix.row_count();
         let memory = || SolveError::Memory { unknowns };
@@ -252,7 +254,7 @@ fn columns_of_lu(
     Ok(([columns, back], symbolic))
 }
 
-/// Where each unknown stands in an order.
+/// The inverse of an order: the rank of each unknown.
 fn inverse(order: &[u32]) -> Vec<u32> {
     let mut inverse = vec![0; order.len()];
     for (at, &unknown) in order.iter().enumerate() {
@@ -261,7 +263,7 @@ fn inverse(order: &[u32]) -> Vec<u32> {
     inverse
 }
 
-/// So many zeros, if there is room.
+/// Zeros; `None` without memory for them.
 fn zeros(count: usize) -> Option<Vec<f64>> {
     let mut values = Vec::new();
     values.try_reserve_exact(count).ok()?;

@@ -1,15 +1,15 @@
 //! Preconditioned conjugate gradients (Hestenes & Stiefel 1952) and BiCGSTAB (van der Vorst 1992).
 //!
-//! Both follow the residual by a recursion that drifts from the truth by rounding. So they end only when the true
-//! residual is small enough, and begin anew from it otherwise, as long as that halves it: where it does not, the
+//! Both update the residual by a recursion that rounding makes drift from the true one. So they end only when the true
+//! residual is small enough, and otherwise restart from it, as long as each restart halves it. Where it does not, the
 //! residual is rounding, and no iteration makes it smaller.
 
 use atomesh::watch::{Cancelled, Phase, Watch, check};
 
-use super::Sparse;
+use super::sparse::Sparse;
 use super::vector::{dot, norm, update};
 
-/// An approximate inverse: linear, the same each time, symmetric where conjugate gradients use it.
+/// An approximate inverse: linear, the same each time, and symmetric for conjugate gradients.
 pub trait Preconditioner {
     /// `z = M⁻¹ r`.
     fn apply(&mut self, r: &[f64], z: &mut [f64]);
@@ -20,29 +20,33 @@ pub trait Preconditioner {
 pub struct Goal {
     /// The residual asked for, ‖b − Ax‖ / ‖b‖.
     pub tolerance: f64,
-    /// The most iterations.
+    /// The largest number of iterations.
     pub limit: usize,
 }
 
-/// Where iteration ended.
+/// The equations `A x = b`.
+#[derive(Clone, Copy, Debug)]
+pub struct Equations<'a> {
+    /// A.
+    pub matrix: &'a Sparse,
+    /// b.
+    pub rhs: &'a [f64],
+}
+
+/// The result of iteration.
 #[derive(Clone, Debug)]
-pub struct Outcome {
-    /// The answer.
+pub struct Found {
+    /// The solution.
     pub x: Vec<f64>,
-    /// How many iterations.
+    /// The number of iterations.
     pub iterations: usize,
 }
 
 /// [`conjugate_gradients`] or [`bicgstab`].
-pub type Solver = fn(
-    &Sparse,
-    &[f64],
-    &mut dyn Preconditioner,
-    Goal,
-    &mut dyn Watch,
-) -> Result<Outcome, Cancelled>;
+pub type Solver =
+    fn(Equations<'_>, &mut dyn Preconditioner, Goal, &mut dyn Watch) -> Result<Found, Cancelled>;
 
-/// One run from a residual: makes `x` better until `enough(‖r‖)`, the limit, or a breakdown.
+/// One run from a residual: improves `x` until ‖r‖ reaches its target, the limit, or a breakdown.
 type Run =
     fn(&mut Iteration<'_>, &mut dyn Preconditioner, &mut Progress<'_>) -> Result<(), Cancelled>;
 
@@ -52,7 +56,7 @@ struct Iteration<'a> {
     r: Vec<f64>,
 }
 
-/// What is left to do, and who is told.
+/// How far the iteration is, and the watch that hears of it.
 struct Progress<'a> {
     watch: &'a mut dyn Watch,
     scale: f64,
@@ -82,13 +86,12 @@ impl Progress<'_> {
 /// # Errors
 /// [`Cancelled`].
 pub fn conjugate_gradients(
-    matrix: &Sparse,
-    rhs: &[f64],
+    equations: Equations<'_>,
     inverse: &mut dyn Preconditioner,
     goal: Goal,
     watch: &mut dyn Watch,
-) -> Result<Outcome, Cancelled> {
-    iterate(matrix, rhs, inverse, goal, (run_conjugate_gradients, watch))
+) -> Result<Found, Cancelled> {
+    iterate(equations, inverse, goal, run_conjugate_gradients, watch)
 }
 
 /// Solves `A x = b` from x = 0.
@@ -96,22 +99,22 @@ pub fn conjugate_gradients(
 /// # Errors
 /// [`Cancelled`].
 pub fn bicgstab(
-    matrix: &Sparse,
-    rhs: &[f64],
+    equations: Equations<'_>,
     inverse: &mut dyn Preconditioner,
     goal: Goal,
     watch: &mut dyn Watch,
-) -> Result<Outcome, Cancelled> {
-    iterate(matrix, rhs, inverse, goal, (run_bicgstab, watch))
+) -> Result<Found, Cancelled> {
+    iterate(equations, inverse, goal, run_bicgstab, watch)
 }
 
 fn iterate(
-    matrix: &Sparse,
-    rhs: &[f64],
+    equations: Equations<'_>,
     inverse: &mut dyn Preconditioner,
     goal: Goal,
-    (run, watch): (Run, &mut dyn Watch),
-) -> Result<Outcome, Cancelled> {
+    run: Run,
+    watch: &mut dyn Watch,
+) -> Result<Found, Cancelled> {
+    let Equations { matrix, rhs } = equations;
     let scale = norm(rhs);
     let target = goal.tolerance * scale;
     let (limit, first) = (goal.limit, scale);
@@ -131,7 +134,7 @@ fn iterate(
             matrix.residual(rhs, &iteration.x, &mut iteration.r);
         }
     }
-    Ok(Outcome { x: best.0, iterations: progress.iterations })
+    Ok(Found { x: best.0, iterations: progress.iterations })
 }
 
 fn run_conjugate_gradients(

@@ -1,10 +1,10 @@
 //! Algebraic multigrid by smoothed aggregation (Vaněk, Mandel & Brezina 1996), a V-cycle as preconditioner.
 //!
-//! Unknowns that are strongly coupled join in aggregates, one unknown each of the next level; what is constant on
-//! aggregates is smoothed by a step of Jacobi's iteration, and the level's matrix is `PᵀAP`. A cycle is a forward
-//! sweep of Gauss and Seidel, the correction by the next level, and a backward sweep: symmetric where A is. The
+//! Strongly coupled unknowns form aggregates, each one unknown of the next level. The piecewise constant interpolation is
+//! smoothed by a Jacobi step to P, and the next level's matrix is `PᵀAP`. A cycle is a forward
+//! Gauss–Seidel sweep, the correction by the next level, and a backward sweep: symmetric if A is. The
 //! last level is solved by factors. Assumes that constants are nearly in the matrix's null space, as they are for
-//! flow. Cost of a cycle: O(entries), some four products with A.
+//! flow. Cost of a cycle: O(entries), about four products with A.
 
 use std::borrow::Cow;
 
@@ -13,11 +13,12 @@ use atomesh::geometry::Point;
 use super::aggregate::{aggregates, smoothed};
 use super::direct::Factors;
 use super::krylov::Preconditioner;
-use super::{Elimination, Sparse};
+use super::order::Elimination;
+use super::sparse::Sparse;
 
-/// A level of so few unknowns is solved by factors.
+/// The most unknowns of a level that is solved by factors.
 const COARSEST: usize = 1000;
-/// The most levels; each has at most this share of the unknowns of the one before, else it is the last.
+/// The most levels. A level that cannot be reduced to this share of its unknowns is the last.
 const LEVELS: usize = 25;
 const SHRINKS: f64 = 0.8;
 /// The most bytes that factors of the last level may take.
@@ -45,7 +46,7 @@ enum Last<'a> {
 }
 
 impl<'a> Multigrid<'a> {
-    /// Makes the levels of a square matrix, with a place for each unknown, by which the last is ordered.
+    /// Makes the levels of a square matrix. There is a place for each unknown, by which the last level is ordered.
     pub fn new<const D: usize>(
         matrix: Cow<'a, Sparse>,
         places: &[Point<D>],
@@ -75,7 +76,7 @@ impl<'a> Multigrid<'a> {
     }
 }
 
-/// The mean place of what each unknown of the next level comes from.
+/// The place of each unknown of the next level: the mean over the unknowns that it is made of.
 pub fn means<const D: usize>(restrict: &Sparse, places: &[Point<D>]) -> Vec<Point<D>> {
     let mean = |row: usize| {
         let (columns, values) = restrict.row(row);
@@ -97,7 +98,7 @@ impl<'a> Last<'a> {
         places: &[Point<D>],
         is_symmetric: bool,
     ) -> Self {
-        let elimination = Elimination::new(&matrix, 1, places, (!is_symmetric, MEMORY as f64));
+        let elimination = Elimination::new(&matrix, 1, places, !is_symmetric, MEMORY as f64);
         match Factors::new(&matrix, &elimination, is_symmetric, MEMORY) {
             Ok(factors) => Self::Factors(Box::new(factors)),
             Err(_) => Self::Sweeps(Sweeps::new(matrix)),
@@ -176,7 +177,7 @@ impl<'a> Sweeps<'a> {
             for (&column, value) in columns.iter().zip(values) {
                 rest -= value * x[column as usize];
             }
-            // the diagonal was taken away with the others
+            // `rest` includes the diagonal's term, so x is corrected
             x[row] += rest * self.inverse[row];
         }
     }

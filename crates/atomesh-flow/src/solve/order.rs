@@ -1,17 +1,17 @@
 //! The order of elimination: nested dissection by the places of blocks (George 1973).
 //!
-//! The blocks are halved along the longest extent of their places; those of one half that touch the other are the
-//! separator, eliminated last; the halves are ordered alike. Assumes that blocks that are coupled are near each
-//! other: otherwise the order is as right, but fills more. Cost: O(n log n).
+//! The blocks are halved along the longest extent of their places. Those of one half that are coupled to the other are the
+//! separator, eliminated last; the halves are ordered in the same way. Assumes that coupled blocks are near each
+//! other: otherwise the order is still valid, but fill grows. Cost: O(n log n).
 
 use atomesh::geometry::Point;
 
-use super::Sparse;
+use super::sparse::Sparse;
 
-/// Parts of so few blocks are not halved.
+/// The most blocks of a part that is not halved.
 const LEAF: usize = 8;
 
-/// Which blocks are coupled, from both sides.
+/// The graph of coupled blocks; each edge is stored at both ends.
 struct Graph {
     starts: Vec<usize>,
     others: Vec<u32>,
@@ -53,8 +53,7 @@ impl Graph {
         Self { starts, others }
     }
 
-    /// Of blocks that are coupled, or coupled to the same one: a factor with row pivots is bounded by that of `AᵀA`
-    /// (George & Ng 1985).
+    /// The graph of AᵀA, whose Cholesky factor bounds the factors of A with row pivots (George & Ng 1985).
     fn squared(&self) -> Self {
         let (mut starts, mut others) = (vec![0], Vec::new());
         let mut seen = vec![u32::MAX; self.starts.len() - 1];
@@ -77,20 +76,20 @@ impl Graph {
     }
 }
 
-/// The order of elimination, and what the factors will be.
+/// The order of elimination, and the cost of the factors.
 #[derive(Clone, Debug)]
 pub struct Elimination {
-    /// The unknowns in their order, those of a block together.
+    /// The unknowns in the order of elimination, those of a block together.
     pub order: Vec<u32>,
-    /// The values of a factor; infinite if there are more than the limit.
+    /// The number of values of a factor; infinite above the limit.
     pub values: f64,
-    /// The multiplications to find it.
+    /// The number of multiplications to compute it.
     pub work: f64,
 }
 
 impl Elimination {
-    /// Orders the unknowns of a square matrix and counts what the factors take, up to `limit` values: those of a Cholesky
-    /// factor, or, with row pivots, of each of the factors L and U at most.
+    /// Orders the unknowns of a square matrix and counts the values of the factor, up to `limit`: those of a Cholesky
+    /// factor, or, with row pivots, an upper bound for each of the factors L and U.
     ///
     /// # Panics
     /// If there is not one place for each block.
@@ -98,7 +97,8 @@ impl Elimination {
         matrix: &Sparse,
         block: usize,
         places: &[Point<D>],
-        (has_pivots, limit): (bool, f64),
+        has_pivots: bool,
+        limit: f64,
     ) -> Self {
         assert_eq!(places.len() * block, matrix.row_count(), "a place for each block");
         let mut graph = Graph::of(matrix, block);
@@ -110,25 +110,18 @@ impl Elimination {
         let (blocks, counts) = postorder(&graph, blocks, limit / (size * size));
         let sum =
             |power: i32| counts.iter().map(|&count| f64::from(count).powi(power)).sum::<f64>();
+        let exceeds = counts.is_empty() && !blocks.is_empty();
         let unknowns = |&own: &u32| (0..block as u32).map(move |inner| own * block as u32 + inner);
         Self {
             order: blocks.iter().flat_map(unknowns).collect(),
-            values: if counts.is_empty() && !blocks.is_empty() {
-                f64::INFINITY
-            } else {
-                size * size * sum(1)
-            },
-            work: if counts.is_empty() && !blocks.is_empty() {
-                f64::INFINITY
-            } else {
-                size.powi(3) * sum(2)
-            },
+            values: if exceeds { f64::INFINITY } else { size * size * sum(1) },
+            work: if exceeds { f64::INFINITY } else { size.powi(3) * sum(2) },
         }
     }
 }
 
-/// The elimination tree of the blocks in their order (Liu 1990), and how many blocks each column of the factor has;
-/// no counts if they sum to more than `limit`. A column's count is found by following the rows' subtrees.
+/// The blocks in a postorder of their elimination tree (Liu 1990), and the number of blocks in each column of the
+/// factor; no counts if they sum to more than `limit`. Columns are counted by following the rows' subtrees.
 fn postorder(graph: &Graph, blocks: Vec<u32>, limit: f64) -> (Vec<u32>, Vec<u32>) {
     const NONE: u32 = u32::MAX;
     let count = blocks.len();
@@ -162,9 +155,9 @@ fn postorder(graph: &Graph, blocks: Vec<u32>, limit: f64) -> (Vec<u32>, Vec<u32>
     (order.iter().map(of).collect(), order.iter().map(|&at| counts[at as usize]).collect())
 }
 
-/// The nodes of a forest, children before parents and together; children have lower numbers than parents.
+/// A postorder of a forest in which children have lower numbers than parents.
 fn depth_first(parents: &[u32]) -> Vec<u32> {
-    // from the back: the last root first, then its last child ...; reversed, parents come after their subtrees
+    // filled from the back: the last root first, then its last child, ...
     let mut sizes = vec![1_u32; parents.len()];
     for node in 0..parents.len() {
         if let Some(size) = sizes.get(parents[node] as usize).copied() {
@@ -199,20 +192,21 @@ fn dissect<const D: usize>(graph: &Graph, places: &[Point<D>]) -> Vec<u32> {
         let own = &mut blocks[start..end];
         let middle = halve(own, places);
         stamp += 2;
-        let [first, second] = separate(graph, own, middle, (&mut side, stamp));
+        let [first, second] = separate(graph, own, middle, &mut side, stamp);
         parts.push((start, start + first));
         parts.push((start + first, start + second));
     }
     blocks
 }
 
-/// Puts the separator of two halves last, the smaller of the two sets of blocks that touch the other half; returns where
+/// Puts the separator of two halves last: the smaller of the two sets of blocks that touch the other half. Returns where
 /// the first half and the second end. `side` then has `stamp` for the first half and `stamp + 1` for the second.
 fn separate(
     graph: &Graph,
     own: &mut [u32],
     middle: usize,
-    (side, stamp): (&mut [u32], u32),
+    side: &mut [u32],
+    stamp: u32,
 ) -> [usize; 2] {
     for (at, &block) in own.iter().enumerate() {
         side[block as usize] = stamp + u32::from(at >= middle);
@@ -238,7 +232,7 @@ fn separate(
     [first, second]
 }
 
-/// Puts the lower half by the longest extent first; returns where the other begins.
+/// Puts the lower half along the longest extent first; returns where the upper one begins.
 fn halve<const D: usize>(blocks: &mut [u32], places: &[Point<D>]) -> usize {
     let extent = |axis: usize| {
         let at = blocks.iter().map(|&block| places[block as usize][axis]);

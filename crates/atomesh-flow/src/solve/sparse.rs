@@ -4,7 +4,7 @@ use std::ops::Range;
 
 use rayon::prelude::*;
 
-/// Rows that one thread treats at a time; fixed, though each row's bits depend on nothing else.
+/// Rows per task; fixed, though each row's bits depend on nothing else.
 const ROWS: usize = 4096;
 
 /// A sparse matrix by its rows (CSR): columns ascending in each row, none twice.
@@ -23,8 +23,14 @@ impl Default for Sparse {
     }
 }
 
-/// Some rows of a matrix under construction: the number of entries of each, columns, values.
-type Part = (Vec<usize>, Vec<u32>, Vec<f64>);
+/// Consecutive rows of a matrix under construction.
+#[derive(Default)]
+struct Part {
+    /// The number of entries of each row.
+    counts: Vec<usize>,
+    columns: Vec<u32>,
+    values: Vec<f64>,
+}
 
 impl Sparse {
     /// A matrix from its rows' starts, columns and values.
@@ -48,8 +54,8 @@ impl Sparse {
         Self { column_count, starts, columns, values }
     }
 
-    /// A matrix from entries in any order; those at one place are added in the order given. Cost: O(entries), and a
-    /// sort of each row.
+    /// A matrix from entries in any order; those of one row and column are added in the order given. Cost: O(entries), and
+    /// a sort of each row.
     ///
     /// # Panics
     /// If an entry lies outside of the matrix.
@@ -86,19 +92,19 @@ impl Sparse {
     }
 
     fn from_parts(row_count: usize, column_count: usize, parts: Vec<Part>) -> Self {
-        let count = parts.iter().map(|part| part.1.len()).sum();
+        let count = parts.iter().map(|part| part.columns.len()).sum();
         let mut starts = Vec::with_capacity(row_count + 1);
         let mut columns = Vec::with_capacity(count);
         let mut values = Vec::with_capacity(count);
         starts.push(0);
         let mut end = 0;
-        for (counts, own_columns, own_values) in parts {
-            starts.extend(counts.iter().map(|count| {
+        for part in parts {
+            starts.extend(part.counts.iter().map(|count| {
                 end += count;
                 end
             }));
-            columns.extend(own_columns);
-            values.extend(own_values);
+            columns.extend(part.columns);
+            values.extend(part.values);
         }
         Self { column_count, starts, columns, values }
     }
@@ -221,8 +227,8 @@ impl Sparse {
     }
 
     fn product_rows(&self, other: &Self, rows: Range<usize>) -> Part {
-        let mut part: Part = Default::default();
-        // where a column's sum stands in `row`; valid if the sum there is of that column
+        let mut part = Part::default();
+        // the place of a column's sum in `row`; valid if that entry is of the column
         let mut place = vec![0_u32; other.column_count];
         let mut row: Vec<(u32, f64)> = Vec::new();
         for at in rows {
@@ -242,14 +248,14 @@ impl Sparse {
                 }
             }
             row.sort_unstable_by_key(|&(column, _)| column);
-            part.0.push(row.len());
-            part.1.extend(row.iter().map(|&(column, _)| column));
-            part.2.extend(row.iter().map(|&(_, value)| value));
+            part.counts.push(row.len());
+            part.columns.extend(row.iter().map(|&(column, _)| column));
+            part.values.extend(row.iter().map(|&(_, value)| value));
         }
         part
     }
 
-    /// `Pᵀ A P`, the matrix seen from the space that the columns of P span.
+    /// `Pᵀ A P`, the matrix projected to the space that the columns of P span.
     ///
     /// # Panics
     /// If P has not as many rows as A has rows and columns.
@@ -281,20 +287,20 @@ fn row_blocks(row_count: usize) -> impl Iterator<Item = Range<usize>> {
 
 /// Sorts the entries of some rows by columns and adds those of one column in the order given.
 fn merge_rows(starts: &[usize], entries: &mut [(u32, f64)]) -> Part {
-    let mut part: Part = Default::default();
+    let mut part = Part::default();
     for ends in starts.windows(2) {
         let row = &mut entries[ends[0] - starts[0]..ends[1] - starts[0]];
         row.sort_by_key(|&(column, _)| column);
-        let before = part.1.len();
+        let before = part.columns.len();
         for &mut (column, value) in row {
-            if part.1.len() > before && part.1.last() == Some(&column) {
-                *part.2.last_mut().expect("as many values as columns") += value;
+            if part.columns.len() > before && part.columns.last() == Some(&column) {
+                *part.values.last_mut().expect("as many values as columns") += value;
             } else {
-                part.1.push(column);
-                part.2.push(value);
+                part.columns.push(column);
+                part.values.push(value);
             }
         }
-        part.0.push(part.1.len() - before);
+        part.counts.push(part.columns.len() - before);
     }
     part
 }

@@ -1,17 +1,20 @@
-//! A preconditioner for blocks of unknowns: sweeps over the blocks, and a correction in a coarse space if there is one.
+//! A preconditioner for blocks of unknowns: Gauss–Seidel sweeps over the blocks, and a correction in a coarse space if
+//! there is one.
 //!
-//! Forward sweep, correction by `P (PᵀAP)⁻¹ Pᵀ`, backward sweep: symmetric where A is. The sweeps treat what is
-//! rough, such as jumps between cells, the coarse space what is smooth (Dobrev et al.
-//! 2006). The coarse matrix is solved by factors if that is cheap, else by a cycle of multigrid.
+//! Forward sweep, correction by `P (PᵀAP)⁻¹ Pᵀ`, backward sweep: symmetric if A is. The sweeps reduce the rough error,
+//! such as jumps between cells, the coarse space the smooth one (Dobrev et al. 2006). The coarse equations are solved
+//! by factors if they are few, else by a cycle of multigrid.
 
 use std::borrow::Cow;
 
 use atomesh::geometry::Point;
 
 use super::blocks::Blocks;
+use super::error::SolveError;
 use super::krylov::Preconditioner;
 use super::multigrid::{Multigrid, means};
-use super::{SolveError, Sparse, System};
+use super::sparse::Sparse;
+use super::system::System;
 
 /// Sweeps and coarse correction.
 pub struct TwoLevel<'a> {

@@ -2,7 +2,7 @@
 
 use rayon::prelude::*;
 
-/// Terms of a sum that are added one after another; the sums of blocks are then added in their order.
+/// Terms per block of a sum; the sums of blocks are added in their order.
 const BLOCK: usize = 8192;
 
 /// The inner product.

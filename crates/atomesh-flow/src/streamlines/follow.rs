@@ -2,74 +2,45 @@
 
 use atomesh::geometry::Point;
 
-use super::pieces::{Beyond, Field, Piece};
+use super::line::{End, Streamline};
+use super::options::{Porosity, TraceOptions};
+use super::pieces::{FluxField, Neighbour, Piece};
 use super::simplex::{Corners, exit};
 use super::starts::Start;
-use super::{End, Porosity, Streamline, TraceOptions};
+use super::wells::WellExchange;
 use crate::setting::Setting;
 
-/// A line that has not moved for so many steps circles around a corner.
+/// Steps without moving after which a line is taken to circle around a corner.
 const STILL: usize = 1000;
 
-/// What ends lines: wells that take all that flows into their cells.
+/// A well that ends lines: it takes all that flows into its cells.
 struct Sink<const D: usize> {
     well: usize,
     place: Point<D>,
-    /// From the boundary of its cells to its place.
+    /// The time from the boundary of its cells to its place.
     time: f64,
 }
 
 /// Follows lines in a field.
 pub struct Tracer<'a, const D: usize> {
-    field: &'a Field<'a, D>,
+    field: &'a FluxField<'a, D>,
     porosity: Porosity<'a>,
     limit: usize,
     sinks: Vec<Sink<D>>,
-    /// The number of a cell's sink, from 1.
+    /// The number of each cell's sink, from 1; 0 without one.
     sink_of: Vec<u32>,
-}
-
-/// What flows out of and into a well's cells through the facets around them, and the volume of their pores.
-pub struct WellCells {
-    pub outward: f64,
-    pub inward: f64,
-    pub pores: f64,
-}
-
-impl WellCells {
-    pub fn new<const D: usize>(
-        field: &Field<'_, D>,
-        cells: &[u32],
-        porosity: &Porosity<'_>,
-    ) -> Self {
-        let mut own = Self { outward: 0.0, inward: 0.0, pores: 0.0 };
-        for &cell in cells {
-            let cell = cell as usize;
-            own.pores += porosity.of(cell) * field.grid.measures()[cell];
-            for &facet in field.grid.facets_of(cell) {
-                let beyond = field.beyond(cell, facet as usize);
-                if beyond.is_some_and(|other| cells.binary_search(&other).is_ok()) {
-                    continue;
-                }
-                let flux = field.out_of(cell, facet as usize);
-                own.outward += flux.max(0.0);
-                own.inward += (-flux).max(0.0);
-            }
-        }
-        own
-    }
 }
 
 impl<'a, const D: usize> Tracer<'a, D> {
     pub fn new(
-        field: &'a Field<'a, D>,
+        field: &'a FluxField<'a, D>,
         setting: &Setting<'_, D>,
         options: &TraceOptions<'a>,
     ) -> Self {
         let mut sinks = Vec::new();
         let mut sink_of = vec![0; field.grid.cell_count()];
         for placed in setting.wells() {
-            let around = WellCells::new(field, &placed.cells, &options.porosity);
+            let around = WellExchange::new(field, &placed.cells, &options.porosity);
             let takes = field.solution.wells[placed.well].rate < 0.0;
             if !takes || around.inward <= 0.0 || around.outward > 1e-9 * around.inward {
                 continue;
@@ -91,9 +62,9 @@ impl<'a, const D: usize> Tracer<'a, D> {
             to: None,
             end: End::Boundary,
         };
-        if let Some((well, cell, time)) = start.well {
-            line.points[0] = well;
-            push(&mut line, start.place, time, cell);
+        if let Some(lead) = &start.lead {
+            line.points[0] = lead.place;
+            push(&mut line, start.place, lead.time, lead.cell);
         }
         let mut at = At { numbers: start.numbers, weights: start.weights };
         let mut into = (start.facet, start.into);
@@ -133,7 +104,7 @@ impl<'a, const D: usize> Tracer<'a, D> {
     ) -> Result<u32, End> {
         let pieces = self.field.pieces(cell as usize);
         let holds = |piece: &Piece<D>| {
-            piece.beyond.contains(&Beyond::Facet(facet)) && at.is_in(&piece.numbers[..=D])
+            piece.beyond.contains(&Neighbour::Facet(facet)) && at.is_in(&piece.numbers[..=D])
         };
         let mut own = pieces.iter().position(holds).ok_or(End::Stagnation)?;
         for _ in 0..STILL {
@@ -147,9 +118,9 @@ impl<'a, const D: usize> Tracer<'a, D> {
             push(line, piece.place(&exit.weights), time, cell);
             *at = At { numbers: piece.numbers, weights: exit.weights };
             match piece.beyond[exit.opposite] {
-                Beyond::Facet(facet) => return Ok(facet),
-                Beyond::Piece(next) => own = next as usize,
-                Beyond::Nothing => return Err(End::Stagnation),
+                Neighbour::Facet(facet) => return Ok(facet),
+                Neighbour::Piece(next) => own = next as usize,
+                Neighbour::Nothing => return Err(End::Stagnation),
             }
         }
         Err(End::Stagnation)
@@ -163,7 +134,7 @@ struct At {
 }
 
 impl At {
-    /// Whether all corners that the place depends on are among the numbers.
+    /// Whether all corners with a weight above 0 are among the numbers.
     fn is_in(&self, numbers: &[u32]) -> bool {
         let corners = self.numbers.iter().zip(&self.weights);
         corners.filter(|(_, weight)| **weight > 0.0).all(|(number, _)| numbers.contains(number))

@@ -1,35 +1,35 @@
-//! Cells as simplices with what flows out of each facet.
+//! Cells as simplices with the flux out of each facet.
 //!
-//! A triangle or tetrahedron is one piece. A Voronoi cell is cut from its centroid to its faces, these into triangles
-//! in space. What flows between the pieces of a cell is that of the cell's mean velocity, and of least norm
-//! in the rest: exact where the velocity is constant, and balanced in each piece.
+//! A triangle or tetrahedron is one piece. A Voronoi cell is cut into cones from its centroid to its faces, in space to the
+//! triangles of these. The fluxes between the pieces of a cell are those of the cell's mean velocity, plus the correction
+//! of least norm that balances each piece: exact where the velocity is constant.
 
 use atomesh::geometry::{Point, Simplex, difference, dot};
 use atomesh::mesh::PolyMesh;
 
 use super::simplex::Corners;
-use crate::grid::Grid;
+use crate::grid::FlowGrid;
 use crate::setting::Setting;
 use crate::solution::Solution;
 
-/// A flux below this share of the largest is rounding: no line follows it.
+/// Share of the largest flux up to which a flux is rounding: no line follows it.
 const ROUNDING: f64 = 1e-13;
 
 /// The number of a corner that is a cell's centroid.
 pub const CENTROID: u32 = u32::MAX;
 
 /// Fluxes that lines may follow.
-pub struct Field<'a, const D: usize> {
-    pub grid: &'a Grid<D>,
-    /// What flows out of each facet's `cell`; 0 where a facet is sealed, or on the boundary has no condition.
+pub struct FluxField<'a, const D: usize> {
+    pub grid: &'a FlowGrid<D>,
+    /// The flux out of each facet's `cell`; 0 if it is sealed, or on the boundary without a condition.
     pub fluxes: Vec<f64>,
     pub solution: &'a Solution<D>,
-    /// Fluxes of no more are rounding.
+    /// Fluxes up to this are rounding.
     least: f64,
 }
 
-impl<'a, const D: usize> Field<'a, D> {
-    pub fn new(grid: &'a Grid<D>, setting: &Setting<'_, D>, solution: &'a Solution<D>) -> Self {
+impl<'a, const D: usize> FluxField<'a, D> {
+    pub fn new(grid: &'a FlowGrid<D>, setting: &Setting<'_, D>, solution: &'a Solution<D>) -> Self {
         let largest = solution.fluxes.iter().fold(0.0_f64, |most, flux| most.max(flux.abs()));
         let least = ROUNDING * largest;
         let open = |facet: usize| {
@@ -43,7 +43,7 @@ impl<'a, const D: usize> Field<'a, D> {
         Self { grid, fluxes, solution, least }
     }
 
-    /// What flows out of a cell through one of its facets.
+    /// The flux out of a cell through one of its facets.
     pub fn out_of(&self, cell: usize, facet: usize) -> f64 {
         let owns = self.grid.facets()[facet].cell as usize == cell;
         if owns { self.fluxes[facet] } else { -self.fluxes[facet] }
@@ -71,13 +71,13 @@ impl<'a, const D: usize> Field<'a, D> {
         let measure = self.grid.measures()[cell];
         let simplex = mesh.simplex(corners);
         let mut piece =
-            Piece { simplex, numbers, measure, fluxes: [0.0; 4], beyond: [Beyond::Nothing; 4] };
+            Piece { simplex, numbers, measure, fluxes: [0.0; 4], beyond: [Neighbour::Nothing; 4] };
         for &facet in self.grid.facets_of(cell) {
             let own = self.grid.facet_corners(facet as usize).expect("facets of a mesh");
             let opposite = corners.iter().position(|corner| !own.contains(corner));
             if let Some(opposite) = opposite {
                 piece.fluxes[opposite] = self.out_of(cell, facet as usize);
-                piece.beyond[opposite] = Beyond::Facet(facet);
+                piece.beyond[opposite] = Neighbour::Facet(facet);
             }
         }
         piece
@@ -95,8 +95,8 @@ impl<'a, const D: usize> Field<'a, D> {
                 let mut numbers = [CENTROID; 4];
                 numbers[1..=D].copy_from_slice(&corners);
                 let measure = (sign * simplex.measure()).max(0.0);
-                let mut beyond = [Beyond::Nothing; 4];
-                beyond[0] = Beyond::Facet(face as u32);
+                let mut beyond = [Neighbour::Nothing; 4];
+                beyond[0] = Neighbour::Facet(face as u32);
                 pieces.push(Piece { simplex, numbers, measure, fluxes: [0.0; 4], beyond });
                 signs.push(sign);
             }
@@ -111,7 +111,7 @@ impl<'a, const D: usize> Field<'a, D> {
         pieces
     }
 
-    /// Finds what flows between the pieces of a cell.
+    /// Computes the fluxes between the pieces of a cell.
     fn balance(&self, cell: usize, pieces: &mut [Piece<D>], signs: &[f64]) {
         let velocity = self.mean_velocity(cell);
         let links = links(pieces);
@@ -144,8 +144,8 @@ impl<'a, const D: usize> Field<'a, D> {
             let flux = if flux.abs() > self.least && flux.is_finite() { flux } else { 0.0 };
             *own = flux;
             pieces[b].fluxes[link.opposite[1]] = -flux;
-            pieces[a].beyond[link.opposite[0]] = Beyond::Piece(b as u32);
-            pieces[b].beyond[link.opposite[1]] = Beyond::Piece(a as u32);
+            pieces[a].beyond[link.opposite[0]] = Neighbour::Piece(b as u32);
+            pieces[b].beyond[link.opposite[1]] = Neighbour::Piece(a as u32);
         }
     }
 
@@ -164,10 +164,10 @@ impl<'a, const D: usize> Field<'a, D> {
 
 /// What lies beyond a facet of a piece.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum Beyond {
-    /// Nothing that is known.
+pub enum Neighbour {
+    /// Unknown.
     Nothing,
-    /// What is beyond a facet of the grid.
+    /// A facet of the grid.
     Facet(u32),
     /// Another piece of the cell.
     Piece(u32),
@@ -179,12 +179,12 @@ pub struct Piece<const D: usize> {
     pub simplex: Simplex<D>,
     /// The numbers of its corners in the mesh.
     pub numbers: [u32; 4],
-    /// Its area (2-D) or volume (3-D).
+    /// Its area (plane) or volume (space).
     pub measure: f64,
-    /// What flows out of the facet opposite each corner.
+    /// The flux out of the facet opposite each corner.
     pub fluxes: Corners,
-    /// What lies beyond it.
-    pub beyond: [Beyond; 4],
+    /// What lies beyond the facet opposite each corner.
+    pub beyond: [Neighbour; 4],
 }
 
 impl<const D: usize> Piece<D> {
@@ -197,9 +197,9 @@ impl<const D: usize> Piece<D> {
         })
     }
 
-    /// The normal out of the facet opposite a corner, as long as the facet is large; `sign` is the orientation's.
+    /// The area vector, outward, of the facet opposite a corner; `sign` is the orientation's.
     fn area(&self, opposite: usize, sign: f64) -> Point<D> {
-        // the measure is |K| λ of the corner at its place: 0 on the facet, and its slope the inward normal / D
+        // the measure as a function of the corner's place is 0 on the facet; its gradient is the inward area vector / D
         let on = if opposite == 0 { self.simplex.others[0] } else { self.simplex.first };
         std::array::from_fn(|axis| {
             let mut place = on;
@@ -214,13 +214,13 @@ impl<const D: usize> Piece<D> {
     }
 }
 
-/// A facet between two pieces of a cell, by the corners opposite.
+/// A facet between two pieces of a cell, by the corners opposite to it.
 struct Link {
     pieces: [usize; 2],
     opposite: [usize; 2],
 }
 
-/// The facets that two pieces share: those that have all corners but one in common.
+/// The facets between pieces: two pieces share one if they have all corners but one in common.
 fn links<const D: usize>(pieces: &[Piece<D>]) -> Vec<Link> {
     let alone = |a: &Piece<D>, b: &Piece<D>| {
         let mut apart = (1..=D).filter(|&k| !b.numbers[1..=D].contains(&a.numbers[k]));
@@ -239,8 +239,8 @@ fn links<const D: usize>(pieces: &[Piece<D>]) -> Vec<Link> {
     links
 }
 
-/// Solves a graph's Laplacian for a right-hand side of sum 0, the first value 0, by Cholesky's factor in place; a row
-/// without a pivot is left 0.
+/// Solves a graph's Laplacian for a right-hand side of sum 0, with the first value 0, by a Cholesky factor in place; the
+/// value of a row without a pivot is 0.
 fn solve_pinned(matrix: &mut [f64], rhs: &mut [f64]) {
     let count = rhs.len();
     if count == 0 {

@@ -1,9 +1,9 @@
-//! The exact way through a simplex.
+//! The exact path through a simplex.
 
-/// Barycentric coordinates, or what belongs to corners, of a triangle (three are used) or a tetrahedron.
+/// Barycentric coordinates, or other values at corners, of a triangle (three are used) or a tetrahedron.
 pub type Corners = [f64; 4];
 
-/// Relative rates of growth below which exponentials are replaced by the first terms of their series.
+/// Exponents below which exponentials are replaced by the first terms of their series.
 const SMALL: f64 = 1e-8;
 
 /// Where a line leaves a simplex.
@@ -17,7 +17,7 @@ pub struct Exit {
     pub time: f64,
 }
 
-/// Follows the velocity `Σ F_i (x − x_i) / (D |K|)` from a place to where it leaves; `None` if it never does.
+/// Follows the velocity `Σ F_i (x − x_i) / (D |K|)` from a place to the exit; `None` if there is none.
 ///
 /// The barycentric coordinates obey `λ_i' = S λ_i − F_i`, S = Σ F_i, in the unit of time named in [`Exit`]: a facet
 /// i with F_i > 0 is reached after `−ln(1 − S λ_i / F_i) / S`.

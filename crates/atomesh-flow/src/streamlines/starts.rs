@@ -1,13 +1,13 @@
-//! Where lines start: around wells that bring something in, and on the boundary where something flows in.
+//! Where lines start: around wells with inflow, and on the boundary where there is inflow.
 
 use std::f64::consts::TAU;
 
 use atomesh::geometry::{Point, Simplex, difference, dot};
 
-use super::TraceOptions;
-use super::follow::WellCells;
-use super::pieces::{CENTROID, Field};
+use super::options::TraceOptions;
+use super::pieces::{CENTROID, FluxField};
 use super::simplex::Corners;
+use super::wells::WellExchange;
 use crate::setting::Setting;
 
 /// The start of a line, on a facet.
@@ -21,11 +21,22 @@ pub struct Start<const D: usize> {
     pub into: Option<u32>,
     /// The well's number.
     pub from: Option<usize>,
-    /// The well's place, the cell between it and the facet, and the time through that cell.
-    pub well: Option<(Point<D>, u32, f64)>,
+    /// From the well to the facet, if the line comes from one.
+    pub lead: Option<Lead<D>>,
 }
 
-/// A part of a facet through which something flows in.
+/// The straight way from a well to the boundary of its cells.
+#[derive(Clone, Copy)]
+pub struct Lead<const D: usize> {
+    /// The well's place.
+    pub place: Point<D>,
+    /// The cell between the well and the boundary.
+    pub cell: u32,
+    /// The time through that cell.
+    pub time: f64,
+}
+
+/// A part of a facet with inflow.
 struct Patch<const D: usize> {
     facet: u32,
     into: Option<u32>,
@@ -33,13 +44,20 @@ struct Patch<const D: usize> {
     points: [Point<D>; D],
     flux: f64,
     from: Option<usize>,
-    well: Option<(Point<D>, u32, f64)>,
+    lead: Option<Lead<D>>,
 }
 
-/// The starts, each for the same flow: patches follow each other around wells and boundary, and a start stands in the
-/// middle of its share of them.
+/// A simplex of a facet, with its share of it.
+struct FacetPart<const D: usize> {
+    corners: [u32; D],
+    points: [Point<D>; D],
+    share: f64,
+}
+
+/// The starts, each for the same flow. Patches are put in a row, around each well and then around the boundary; the row
+/// is divided into equal flows, and a start stands in the middle of each.
 pub fn starts<const D: usize>(
-    field: &Field<'_, D>,
+    field: &FluxField<'_, D>,
     setting: &Setting<'_, D>,
     options: &TraceOptions<'_>,
 ) -> Vec<Start<D>> {
@@ -71,28 +89,30 @@ pub fn starts<const D: usize>(
     starts
 }
 
-/// The parts of a facet with their shares of it.
-fn parts<const D: usize>(field: &Field<'_, D>, facet: u32) -> Vec<([u32; D], [Point<D>; D], f64)> {
+/// The simplices of a facet.
+fn parts<const D: usize>(field: &FluxField<'_, D>, facet: u32) -> Vec<FacetPart<D>> {
     let places = |points: &[Point<D>], corners: [u32; D]| corners.map(|c| points[c as usize]);
     if let Some(mesh) = field.grid.mesh() {
         let corners = *field.grid.facet_corners(facet as usize).expect("facets of a mesh");
-        return vec![(corners, places(mesh.points(), corners), 1.0)];
+        return vec![FacetPart { corners, points: places(mesh.points(), corners), share: 1.0 }];
     }
     let mesh = field.grid.cells().expect("cells of a grid are Voronoi cells or simplices");
     let own = &field.grid.facets()[facet as usize];
     let first = field.grid.centroids()[own.cell as usize];
     let part = |corners: [u32; D]| {
-        let others = places(mesh.points(), corners);
-        (corners, others, Simplex { first, others }.measure().abs())
+        let points = places(mesh.points(), corners);
+        let share = Simplex { first, others: points }.measure().abs();
+        FacetPart { corners, points, share }
     };
     let mut parts: Vec<_> = mesh.face_parts(facet as usize).map(part).collect();
-    let whole: f64 = parts.iter().map(|part| part.2).sum();
-    parts.iter_mut().for_each(|part| part.2 = if whole > 0.0 { part.2 / whole } else { 0.0 });
+    let whole: f64 = parts.iter().map(|part| part.share).sum();
+    let share = |measure: f64| if whole > 0.0 { measure / whole } else { 0.0 };
+    parts.iter_mut().for_each(|part| part.share = share(part.share));
     parts
 }
 
 fn around_well<const D: usize>(
-    field: &Field<'_, D>,
+    field: &FluxField<'_, D>,
     cells: &[u32],
     well: usize,
     place: Point<D>,
@@ -102,7 +122,7 @@ fn around_well<const D: usize>(
     if field.solution.wells[well].rate <= 0.0 {
         return patches;
     }
-    let around = WellCells::new(field, cells, &options.porosity);
+    let around = WellExchange::new(field, cells, &options.porosity);
     for &cell in cells {
         for &facet in field.grid.facets_of(cell as usize) {
             let into = field.beyond(cell as usize, facet as usize);
@@ -111,17 +131,17 @@ fn around_well<const D: usize>(
             if inner || flux <= 0.0 {
                 continue;
             }
-            let lead = Some((place, cell, around.pores / around.outward));
-            patches.extend(parts(field, facet).into_iter().map(|(corners, points, share)| {
-                let (flux, from) = (flux * share, Some(well));
-                Patch { facet, into, corners, points, flux, from, well: lead }
+            let lead = Some(Lead { place, cell, time: around.pores / around.outward });
+            patches.extend(parts(field, facet).into_iter().map(|part| {
+                let FacetPart { corners, points, share } = part;
+                Patch { facet, into, corners, points, flux: flux * share, from: Some(well), lead }
             }));
         }
     }
     patches
 }
 
-fn on_boundary<const D: usize>(field: &Field<'_, D>) -> Vec<Patch<D>> {
+fn on_boundary<const D: usize>(field: &FluxField<'_, D>) -> Vec<Patch<D>> {
     let mut patches = Vec::new();
     for (number, facet) in field.grid.facets().iter().enumerate() {
         let flux = -field.fluxes[number];
@@ -129,23 +149,24 @@ fn on_boundary<const D: usize>(field: &Field<'_, D>) -> Vec<Patch<D>> {
             continue;
         }
         let (facet, into) = (number as u32, Some(facet.cell));
-        patches.extend(parts(field, facet).into_iter().map(|(corners, points, share)| {
-            let flux = flux * share;
-            Patch { facet, into, corners, points, flux, from: None, well: None }
+        patches.extend(parts(field, facet).into_iter().map(|part| {
+            let FacetPart { corners, points, share } = part;
+            Patch { facet, into, corners, points, flux: flux * share, from: None, lead: None }
         }));
     }
     patches
 }
 
 /// The middle of the cells' centroids.
-fn middle<const D: usize>(field: &Field<'_, D>) -> Point<D> {
+fn middle<const D: usize>(field: &FluxField<'_, D>) -> Point<D> {
     let centroids = field.grid.centroids();
     std::array::from_fn(|axis| {
         centroids.iter().map(|c| c[axis]).sum::<f64>() / centroids.len().max(1) as f64
     })
 }
 
-/// In the plane counter-clockwise about a centre, also within a patch, from the widest gap on; in space as they are.
+/// In the plane, orders patches and their corners counter-clockwise about a centre, from the widest gap on; in space the
+/// order stays.
 fn order_around<const D: usize>(patches: &mut [Patch<D>], centre: &Point<D>) {
     if D != 2 {
         return;
@@ -177,7 +198,7 @@ fn order_around<const D: usize>(patches: &mut [Patch<D>], centre: &Point<D>) {
 }
 
 impl<const D: usize> Patch<D> {
-    /// The start at a share of the patch; across it, in space, places follow the golden ratio, which fills evenly.
+    /// The start at a share of the patch. In space the places across it follow the golden ratio, which fills evenly.
     fn start(&self, share: f64, number: usize) -> Start<D> {
         let share = share.clamp(0.0, 1.0);
         let mut own = [0.0; D];
@@ -195,7 +216,7 @@ impl<const D: usize> Patch<D> {
             let axis_of: Point<D> = self.points.map(|point| point[axis]);
             dot(&axis_of, &own)
         });
-        let (facet, into, from, well) = (self.facet, self.into, self.from, self.well);
-        Start { place, numbers, weights, facet, into, from, well }
+        let Self { facet, into, from, lead, .. } = *self;
+        Start { place, numbers, weights, facet, into, from, lead }
     }
 }

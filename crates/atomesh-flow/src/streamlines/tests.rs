@@ -1,13 +1,13 @@
 use std::f64::consts::PI;
 use std::ops::ControlFlow;
 
-use atomesh::geometry::{Bounds, difference, distance_squared, dot};
+use atomesh::geometry::{Bounds, Point, difference, distance_squared, dot};
 use atomesh::mesh::{Delaunay, PolyMesh};
 use atomesh::voronoi::voronoi;
 use atomesh::watch::Silent;
 use proptest::prelude::*;
 
-use super::pieces::Beyond;
+use super::pieces::Neighbour;
 use super::*;
 use crate::problem::{Barrier, Boundary, Condition, Control, Problem, Value, Well};
 use crate::solve::{SolveOptions, SolveReport};
@@ -27,7 +27,7 @@ fn open<const D: usize>() -> Problem<'static, D> {
 }
 
 /// The fluxes of a velocity that is the same everywhere.
-fn uniform<const D: usize>(grid: &Grid<D>, velocity: &Point<D>) -> Solution<D> {
+fn uniform<const D: usize>(grid: &FlowGrid<D>, velocity: &Point<D>) -> Solution<D> {
     let fluxes = grid.facets().iter().map(|facet| dot(&facet.area, velocity)).collect();
     let count = grid.cell_count();
     let solve =
@@ -50,7 +50,7 @@ fn cells<const D: usize>(
 }
 
 fn traced<const D: usize>(
-    grid: &Grid<D>,
+    grid: &FlowGrid<D>,
     problem: &Problem<'_, D>,
     solution: &Solution<D>,
     count: usize,
@@ -68,7 +68,7 @@ fn traced<const D: usize>(
     lines
 }
 
-fn uniform_flow_is_straight<const D: usize>(grid: &Grid<D>, velocity: Point<D>) {
+fn uniform_flow_is_straight<const D: usize>(grid: &FlowGrid<D>, velocity: Point<D>) {
     let lines = traced(grid, &open(), &uniform(grid, &velocity), 60);
     assert_eq!(lines.len(), 60);
     for line in &lines {
@@ -93,11 +93,11 @@ fn uniform_flow_is_straight_and_on_time_in_triangles_and_tetrahedra() {
 #[test]
 fn uniform_flow_is_straight_and_on_time_in_voronoi_cells() {
     uniform_flow_is_straight(
-        &Grid::of_cells(&cells(Delaunay::<2>::new(), 9, 0.3, 1), None),
+        &FlowGrid::of_cells(&cells(Delaunay::<2>::new(), 9, 0.3, 1), None),
         [0.6, 0.25],
     );
     uniform_flow_is_straight(
-        &Grid::of_cells(&cells(Delaunay::<3>::new(), 5, 0.3, 2), None),
+        &FlowGrid::of_cells(&cells(Delaunay::<3>::new(), 5, 0.3, 2), None),
         [0.6, 0.25, 0.1],
     );
 }
@@ -120,7 +120,7 @@ fn rate<const D: usize>(name: &str, place: Point<D>, rate: f64) -> Well<D> {
     Well { name: name.to_string(), place, control: Control::Rate(rate), radius: None }
 }
 
-fn answer<const D: usize>(grid: &Grid<D>, problem: &Problem<'_, D>) -> Solution<D> {
+fn answer<const D: usize>(grid: &FlowGrid<D>, problem: &Problem<'_, D>) -> Solution<D> {
     let setting = Setting::new(problem, grid).unwrap();
     match grid.cells() {
         Some(cells) => {
@@ -134,7 +134,7 @@ fn answer<const D: usize>(grid: &Grid<D>, problem: &Problem<'_, D>) -> Solution<
 }
 
 /// A well of rate 1 in the middle of a square whose sides have the pressure of the exact field.
-fn radial(grid: &Grid<2>) -> (f64, f64) {
+fn radial(grid: &FlowGrid<2>) -> (f64, f64) {
     let centre = [0.5; 2];
     let exact = |p: &Point<2>| -distance_squared(p, &centre).sqrt().ln() / (2.0 * PI);
     let condition = Condition::Pressure(Value::Field(&exact));
@@ -160,7 +160,7 @@ fn time_of_flight_from_a_well_is_the_pore_volume_over_the_rate() {
     // t = π r² / Q; the mesh resolves the well's star of cells with some twenty steps to the side
     for grid in [
         unit_box(Delaunay::<2>::new(), 40, 0.2, 5),
-        Grid::of_cells(&cells(Delaunay::<2>::new(), 41, 0.2, 5), None),
+        FlowGrid::of_cells(&cells(Delaunay::<2>::new(), 41, 0.2, 5), None),
     ] {
         let (mean, spread) = radial(&grid);
         assert!((mean - 1.0).abs() < 0.02 && spread < 0.1, "{mean} {spread}");
@@ -174,7 +174,7 @@ fn pair<const D: usize>(a: f64, b: f64) -> Problem<'static, D> {
     }
 }
 
-fn all_lines_from_the_source_end_at_the_sink<const D: usize>(grid: &Grid<D>) {
+fn all_lines_from_the_source_end_at_the_sink<const D: usize>(grid: &FlowGrid<D>) {
     let problem = pair::<D>(0.21, 0.77);
     let lines = traced(grid, &problem, &answer(grid, &problem), 40);
     assert_eq!(lines.len(), 40);
@@ -189,11 +189,11 @@ fn all_lines_from_the_source_end_at_the_sink<const D: usize>(grid: &Grid<D>) {
 fn all_lines_from_a_source_end_at_the_sink() {
     all_lines_from_the_source_end_at_the_sink(&unit_box(Delaunay::<2>::new(), 12, 0.2, 1));
     all_lines_from_the_source_end_at_the_sink(&unit_box(Delaunay::<3>::new(), 6, 0.2, 1));
-    all_lines_from_the_source_end_at_the_sink(&Grid::of_cells(
+    all_lines_from_the_source_end_at_the_sink(&FlowGrid::of_cells(
         &cells(Delaunay::<2>::new(), 12, 0.2, 1),
         None,
     ));
-    all_lines_from_the_source_end_at_the_sink(&Grid::of_cells(
+    all_lines_from_the_source_end_at_the_sink(&FlowGrid::of_cells(
         &cells(Delaunay::<3>::new(), 6, 0.2, 1),
         None,
     ));
@@ -240,11 +240,11 @@ fn no_line_crosses_a_sealed_wall() {
 
 fn inner_fluxes_balance<const D: usize>(delaunay: Delaunay<D>, steps: usize) {
     let mesh = cells(delaunay, steps, 0.3, 4);
-    let grid = Grid::of_cells(&mesh, None);
+    let grid = FlowGrid::of_cells(&mesh, None);
     let problem = pair::<D>(0.21, 0.77);
     let setting = Setting::new(&problem, &grid).unwrap();
     let solution = answer(&grid, &problem);
-    let field = Field::new(&grid, &setting, &solution);
+    let field = FluxField::new(&grid, &setting, &solution);
     for cell in 0..grid.cell_count() {
         let pieces = field.pieces(cell);
         let measure: f64 = pieces.iter().map(|piece| piece.measure).sum();
@@ -255,12 +255,13 @@ fn inner_fluxes_balance<const D: usize>(delaunay: Delaunay<D>, steps: usize) {
             // rates are 1
             assert!((sum - net * piece.measure / measure).abs() < 1e-13, "{piece:?}");
             for corner in 0..=D {
-                if let Beyond::Piece(other) = piece.beyond[corner] {
+                if let Neighbour::Piece(other) = piece.beyond[corner] {
                     let other = &pieces[other as usize];
-                    let back = other.beyond.iter().position(|b| *b == Beyond::Piece(number as u32));
+                    let back =
+                        other.beyond.iter().position(|b| *b == Neighbour::Piece(number as u32));
                     assert_eq!(other.fluxes[back.unwrap()], -piece.fluxes[corner]);
                 } else {
-                    assert!(matches!(piece.beyond[corner], Beyond::Facet(_)));
+                    assert!(matches!(piece.beyond[corner], Neighbour::Facet(_)));
                 }
             }
         }
@@ -333,13 +334,13 @@ proptest! {
     fn all_lines_end_whatever_the_fluxes(
         seed: u64, kind in 0_usize..4, x in 0.0_f64..1.0, y in 0.0_f64..1.0,
     ) {
-        let problem = |grid: &Grid<2>| {
+        let problem = |grid: &FlowGrid<2>| {
             let place = if seed % 2 == 0 { [x, y] } else { grid.centroids()[0] };
             Problem { wells: vec![rate("in", place, 1.0)], ..open() }
         };
         let grid = match kind {
             0 | 1 => unit_box(Delaunay::<2>::new(), 5, 0.4, seed),
-            _ => Grid::of_cells(&cells(Delaunay::<2>::new(), 5, 0.45, seed), None),
+            _ => FlowGrid::of_cells(&cells(Delaunay::<2>::new(), 5, 0.45, seed), None),
         };
         let problem = problem(&grid);
         let mut solution = answer(&grid, &problem);

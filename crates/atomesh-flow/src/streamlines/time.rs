@@ -4,32 +4,32 @@ use std::collections::VecDeque;
 
 use atomesh::watch::{Phase, Watch, check};
 
-use super::Porosity;
-use super::pieces::Field;
+use super::options::Porosity;
+use super::pieces::FluxField;
 use crate::error::FlowError;
-use crate::grid::Grid;
+use crate::grid::FlowGrid;
 use crate::setting::Setting;
 use crate::solution::Solution;
 
-/// Sweeps over cells in cycles, until times change by less than this share.
+/// Sweeps over cells in cycles end when times change by less than this share, or after so many.
 const TOLERANCE: f64 = 1e-12;
 const SWEEPS: usize = 1000;
 
-/// The mean time of flight from where something flows in to each cell: `v·∇τ = φ` by upwind differences of first order,
-/// `Σ F_out τ_K = Σ F_in τ_upwind + φ |K|`, in the order of the flow (Natvig & Lie 2008). Where nothing flows
-/// through a cell it is infinite. Cost: O(cells), as often as cycles of cells ask for, if there are any.
+/// The mean time of flight from the inflow to each cell: `v·∇τ = φ` by first-order upwind differences,
+/// `Σ F_out τ_K = Σ F_in τ_upwind + φ |K|`, solved in the order of the flow (Natvig & Lie 2008). Infinite where nothing
+/// flows through a cell. Cost: O(cells), and a sweep over the cells in cycles until they converge, if there are any.
 ///
 /// # Errors
 /// [`FlowError::Porosity`], [`FlowError::PorosityCount`], [`FlowError::Cancelled`].
 pub fn time_of_flight<const D: usize>(
-    grid: &Grid<D>,
+    grid: &FlowGrid<D>,
     setting: &Setting<'_, D>,
     solution: &Solution<D>,
     porosity: Porosity<'_>,
     watch: &mut dyn Watch,
 ) -> Result<Vec<f64>, FlowError> {
     porosity.check(grid.cell_count())?;
-    let field = Field::new(grid, setting, solution);
+    let field = FluxField::new(grid, setting, solution);
     let (order, sorted) = flow_order(&field);
     let mut times = vec![f64::INFINITY; grid.cell_count()];
     let update = |cell: usize, times: &mut Vec<f64>| {
@@ -38,7 +38,7 @@ pub fn time_of_flight<const D: usize>(
             let flux = -field.out_of(cell, facet as usize);
             let upwind = field.beyond(cell, facet as usize);
             let before = upwind.map_or(0.0, |upwind| times[upwind as usize]);
-            // what comes from where nothing flows is rounding
+            // a flux from a cell without flow is rounding
             if flux > 0.0 && before.is_finite() {
                 inward += flux;
                 sum += flux * before;
@@ -67,9 +67,9 @@ pub fn time_of_flight<const D: usize>(
     Ok(times)
 }
 
-/// The cells, each after all that flow into it, and how many could be ordered so. Where only cycles are left the one
-/// that flow reached first goes on, so that sweeps in this order need be few.
-fn flow_order<const D: usize>(field: &Field<'_, D>) -> (Vec<u32>, usize) {
+/// The cells in the order of the flow, each after all that flow into it, and how many could be ordered so. Where only
+/// cycles are left, the cell that the flow reached first comes next, so that few sweeps are needed.
+fn flow_order<const D: usize>(field: &FluxField<'_, D>) -> (Vec<u32>, usize) {
     let grid = field.grid;
     let count = grid.cell_count();
     let into = |cell: usize| {
@@ -81,7 +81,7 @@ fn flow_order<const D: usize>(field: &Field<'_, D>) -> (Vec<u32>, usize) {
     let mut waits: Vec<usize> = (0..count).map(|cell| into(cell).count()).collect();
     let mut done: Vec<bool> = waits.iter().map(|&waits| waits == 0).collect();
     let mut order: Vec<u32> = (0..count as u32).filter(|&cell| done[cell as usize]).collect();
-    // those that flow has reached, then all others
+    // the cells that the flow has reached, then all others
     let (mut reached, mut others) = (VecDeque::new(), 0..count as u32);
     let (mut at, mut sorted) = (0, None);
     while order.len() < count {

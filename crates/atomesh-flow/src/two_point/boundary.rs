@@ -1,38 +1,38 @@
-//! What holds on the faces on sides of the box.
+//! Conditions on the faces on sides of the box.
 
 use atomesh::geometry::{Point, difference, distance_squared};
 use atomesh::mesh::{BoundaryConnection, PolyMesh, boundary_connections};
 
-use crate::grid::{Grid, facet_integral};
+use crate::grid::{FlowGrid, facet_integral};
 use crate::problem::{Condition, Value};
 use crate::setting::Setting;
 
-/// A site nearer to a side than this share of its cell's width lies on it.
+/// Distance from a side, as a share of the cell's width, up to which a site lies on the side.
 const ON_SIDE: f64 = 1e-11;
 
-/// What holds on a face on a side.
+/// The condition on a face on a side.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(super) enum Side {
-    /// So much flows in; 0 where nothing is said.
+    /// The flow into the box; 0 without a condition.
     Inflow(f64),
-    /// The pressure at the foot of the perpendicular from the site, and how much flows for a unit of difference.
+    /// The pressure at the foot of the perpendicular from the site, and the flow per unit of pressure difference.
     Pressure { value: f64, transmissibility: f64 },
     /// The pressure of the site itself, which lies on the face.
     Fixed,
 }
 
-/// What holds on all sides.
+/// The conditions on all sides.
 pub(super) struct Sides {
-    /// Of each face on a side, in the mesh's order: the first one follows the last face between two cells.
+    /// Of each face on a side, in the mesh's order, from the first face that is not between two cells.
     pub faces: Vec<Side>,
-    /// The pressure of each cell whose site lies where the pressure is given.
+    /// The pressure of each cell whose site lies on a side of given pressure.
     pub fixed: Vec<Option<f64>>,
 }
 
-/// Finds what holds. A cell whose site lies on two sides of given pressure obeys the one named last.
+/// Finds the conditions. A cell whose site lies on two sides of given pressure obeys the one named last.
 pub(super) fn sides<const D: usize>(
     cells: &PolyMesh<D>,
-    grid: &Grid<D>,
+    grid: &FlowGrid<D>,
     setting: &Setting<'_, D>,
 ) -> Sides {
     let mut fixed = vec![None; cells.cell_count()];
@@ -65,9 +65,9 @@ pub(super) fn sides<const D: usize>(
     Sides { faces, fixed }
 }
 
-/// The value at the foot of the perpendicular from the site, as seen from the face: the foot may lie beyond it, where
-/// other rock is. Read along the line from the face's centroid to the foot, as far as it lies within the face,
-/// and prolonged; so exact for linear values.
+/// The value at the foot of the perpendicular from the site, extrapolated from the face: the foot may lie beyond it, in
+/// other rock. Taken at the centroid and at a place within the face on the way to the foot, so exact for linear
+/// values.
 fn value_at_foot<const D: usize>(
     cells: &PolyMesh<D>,
     face: usize,
@@ -83,7 +83,7 @@ fn value_at_foot<const D: usize>(
         .map(|corner| distance_squared(corner, &own.centroid))
         .fold(0.0_f64, f64::max)
         .sqrt();
-    // a disk this wide around its centroid lies in a convex face
+    // a disk of this radius about its centroid lies in a convex face
     let within = if D == 2 { radius } else { own.area / (6.0 * radius) };
     if away <= within {
         return value.at(&foot);

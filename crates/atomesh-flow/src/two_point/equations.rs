@@ -1,4 +1,4 @@
-//! One equation a cell: what flows out through its faces is what flows in by sources, sides and wells.
+//! One equation per cell: the flow out through its faces equals that in from sources, sides and wells.
 
 use std::collections::BTreeMap;
 
@@ -9,20 +9,20 @@ use super::boundary::{Side, Sides};
 use super::shares::share;
 use super::well::Coupling;
 use crate::error::FlowError;
-use crate::grid::Grid;
+use crate::grid::FlowGrid;
 use crate::problem::Control;
 use crate::setting::Setting;
 use crate::solution::{Solution, WellFlow};
 use crate::solve::{SolveOptions, SolveReport, Sparse, System, solve};
 
-/// The number of a cell whose pressure is given.
+/// The unknown of a cell whose pressure is given.
 const NONE: u32 = u32::MAX;
 
-/// The equations, with all that the fluxes are made from.
+/// The equations, and what the fluxes are computed from.
 pub(super) struct Equations<'a, const D: usize> {
-    grid: &'a Grid<D>,
+    grid: &'a FlowGrid<D>,
     setting: &'a Setting<'a, D>,
-    /// Of faces between two cells.
+    /// The transmissibility of each face between two cells.
     inner: Vec<f64>,
     sides: Sides,
     wells: Vec<Coupling>,
@@ -34,7 +34,7 @@ pub(super) struct Equations<'a, const D: usize> {
 
 impl<'a, const D: usize> Equations<'a, D> {
     pub fn new(
-        grid: &'a Grid<D>,
+        grid: &'a FlowGrid<D>,
         setting: &'a Setting<'a, D>,
         inner: Vec<f64>,
         sides: Sides,
@@ -97,7 +97,7 @@ impl<'a, const D: usize> Equations<'a, D> {
             row.push((number as u32, diagonal[number]));
             row.sort_by_key(|entry| entry.0);
             for &(column, value) in &row {
-                // two cells may share two faces that rounding parted
+                // rounding may split the face between two cells in two
                 if columns.len() > starts[number] && columns.last() == Some(&column) {
                     *values.last_mut().expect("there is one before") += value;
                 } else {
@@ -110,7 +110,7 @@ impl<'a, const D: usize> Equations<'a, D> {
         (Sparse::new(self.cells.len(), starts, columns, values), rhs)
     }
 
-    /// The cell beyond an inner face that lets something through, and how much.
+    /// The cell beyond an inner face of positive transmissibility, and the transmissibility.
     fn across(&self, face: u32, cell: u32) -> Option<(u32, f64)> {
         let facet = &self.grid.facets()[face as usize];
         let neighbour = facet.neighbour?;
@@ -119,7 +119,7 @@ impl<'a, const D: usize> Equations<'a, D> {
         (transmissibility > 0.0).then_some((other, transmissibility))
     }
 
-    /// What sources, wells and sides bring, and how much of it falls with the cell's own pressure.
+    /// What sources, wells and sides add to the diagonal and to the right-hand side.
     fn diagonal_and_rhs(&self) -> (Vec<f64>, Vec<f64>) {
         let mut diagonal = vec![0.0; self.cells.len()];
         let sources = self.setting.sources();
@@ -153,7 +153,8 @@ impl<'a, const D: usize> Equations<'a, D> {
         (diagonal, rhs)
     }
 
-    /// Makes the row definite if nothing else in its compartment is: as a well of pressure 0 would.
+    /// Adds a well of pressure 0 in the first cell of a compartment without a given pressure, so that the matrix is
+    /// definite.
     fn pin(&self, cell: u32, diagonal: &mut f64) {
         let number = self.setting.compartment_of()[cell as usize] as usize;
         let compartment = &self.setting.compartments()[number];
@@ -164,7 +165,7 @@ impl<'a, const D: usize> Equations<'a, D> {
         }
     }
 
-    /// Fluxes, sources and wells of given pressures.
+    /// Fluxes, sources and wells from the pressures.
     pub fn solution(&self, pressures: Vec<f64>, solve: SolveReport) -> Solution<D> {
         let wells: Vec<WellFlow> = self.wells.iter().map(|w| self.flow(w, &pressures)).collect();
         let mut sources = self.setting.sources().to_vec();
@@ -189,7 +190,7 @@ impl<'a, const D: usize> Equations<'a, D> {
         WellFlow { name: problem.name.clone(), compartment, rate, cell_pressure, wall_pressure }
     }
 
-    /// Through each face out of its cell. What flows through the sides on which a cell's site lies is what balances
+    /// The flux through each face, out of its cell. Through the sides on which a cell's site lies flows what balances
     /// the cell.
     fn fluxes(&self, pressures: &[f64], sources: &[f64]) -> Vec<f64> {
         let facets = self.grid.facets();

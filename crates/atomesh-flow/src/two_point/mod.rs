@@ -1,17 +1,17 @@
-//! Two-point flux on Voronoi cells: one pressure a cell, at its site, and through each face a flux in proportion to
-//! the difference of the two pressures beside it.
+//! Two-point flux on Voronoi cells: one pressure per cell, at its site, and through each face a flux in proportion to
+//! the difference between the pressures on its two sides.
 //!
-//! Faces of Voronoi cells stand at right angles to the lines between sites, so that for isotropic permeability the
-//! flux of a linear pressure is exact, whatever the cells look like (Heinemann et al. 1991). In order:
+//! Faces of Voronoi cells are normal to the lines between sites. So the flux of a linear pressure is exact for
+//! isotropic permeability and cells of any shape (Heinemann et al. 1991). In order:
 //!
 //! 1. `transmissibility`: of each face between two cells, with k on either side and the multiplier of a barrier;
-//! 2. `boundary`: what holds on faces on sides of the box. A site on a side *is* the boundary: where the pressure is
-//!    given there it is no unknown;
+//! 2. `boundary`: conditions on faces on sides of the box. If the pressure is given on a side, a cell whose site lies on
+//!    that side has this pressure, and no unknown;
 //! 3. `well`: the radius at which a well's pressure is that of its cell;
-//! 4. `equations`: one row for each unknown cell, symmetric and positive definite; fluxes from the answer.
+//! 4. `equations`: one row for each unknown pressure, symmetric and positive definite; fluxes from the solution.
 //!
 //! Mass is conserved in each cell to the residual of the equations. The error of pressures is of order 2 in the
-//! distance of sites on lattices, of order 1 at least on any.
+//! distance between sites on lattices, and of order 1 or more on other cells.
 
 mod boundary;
 mod equations;
@@ -28,26 +28,26 @@ use atomesh::mesh::PolyMesh;
 use atomesh::watch::{Phase, Watch, check};
 
 use crate::error::FlowError;
-use crate::grid::Grid;
+use crate::grid::FlowGrid;
 use crate::setting::Setting;
 use crate::solution::Solution;
 use crate::solve::SolveOptions;
 
-/// Steady flow on Voronoi cells. `grid` is [`Grid::of_cells`] of `cells`, with any sets added, and `setting` is of
+/// Steady flow on Voronoi cells. `grid` is [`FlowGrid::of_cells`] of `cells`, with any sets added, and `setting` is of
 /// that grid. Pressures are those at the sites.
 ///
-/// Cost: that of solving one equation a cell. Reports [`Phase::Assemble`] and [`Phase::Solve`] to `watch`.
+/// Cost: that of solving one equation per cell. Reports [`Phase::Assemble`] and [`Phase::Solve`] to `watch`.
 ///
 /// # Errors
-/// [`FlowError::Tensor`] if the permeability is one, [`FlowError::Skewed`] if a face does not stand at a right angle
-/// to the line between its sites, [`FlowError::WellRadius`] if a well of given pressure has no radius or one that is
-/// too large, and what [`solve`](crate::solve::solve()) says.
+/// [`FlowError::Tensor`] if the permeability is one, [`FlowError::Skewed`] if a face is not normal to the line between
+/// its sites, [`FlowError::WellRadius`] if a well of given pressure has no radius or one that is too large, and the
+/// errors of [`solve`](crate::solve::solve()).
 ///
 /// # Panics
 /// If the grid is not of these cells.
 pub fn solve<const D: usize>(
     cells: &PolyMesh<D>,
-    grid: &Grid<D>,
+    grid: &FlowGrid<D>,
     setting: &Setting<'_, D>,
     options: &SolveOptions,
     watch: &mut dyn Watch,

@@ -1,15 +1,15 @@
-//! What flows through the sides of a cell whose pressure is given: together what balances the cell, each about as
-//! much as the velocity in the cell says.
+//! The fluxes through the sides of a cell whose pressure is given: together they balance the cell, and each is near
+//! what the velocity in the cell makes it.
 
 use atomesh::geometry::{Point, dot};
 
-use crate::grid::Grid;
+use crate::grid::FlowGrid;
 
 /// Shares what has to flow out of a cell, `excess`, among its `fixed` faces on sides, whose entries in `fluxes` are 0
-/// until then: the velocity that fits the cell's other faces best in the least squares, through each of them, and
-/// the rest by area. So a uniform velocity is exact in the corners of the box, too.
+/// before. Each gets the flux of the velocity that fits the cell's other faces by least squares; the rest is shared by
+/// area. So a uniform velocity is exact in the corners of the box, too.
 pub(super) fn share<const D: usize>(
-    grid: &Grid<D>,
+    grid: &FlowGrid<D>,
     cell: usize,
     fixed: &[u32],
     excess: f64,
@@ -29,9 +29,9 @@ pub(super) fn share<const D: usize>(
     }
 }
 
-/// The least sum of (flux − v · area)² / area over the faces that are not fixed; `None` if they do not tell v.
+/// The least sum of (flux − v · area)² / area over the faces that are not fixed; `None` if they do not determine v.
 fn velocity<const D: usize>(
-    grid: &Grid<D>,
+    grid: &FlowGrid<D>,
     cell: usize,
     fixed: &[u32],
     fluxes: &[f64],
@@ -44,7 +44,7 @@ fn velocity<const D: usize>(
             continue;
         }
         for i in 0..D {
-            // seen from the other side area and flux both turn over
+            // seen from the other side, area and flux both change sign
             rhs[i] += facet.area[i] * fluxes[*face as usize] / measure;
             (0..D).for_each(|j| matrix[i][j] += facet.area[i] * facet.area[j] / measure);
         }
@@ -52,7 +52,7 @@ fn velocity<const D: usize>(
     solved(matrix, rhs)
 }
 
-/// Gauss's elimination of a matrix that is positive semidefinite; `None` if a pivot is lost to rounding.
+/// Solves by Gaussian elimination, for a positive semidefinite matrix; `None` if a pivot is lost to rounding.
 fn solved<const D: usize>(mut matrix: [[f64; D]; D], mut rhs: [f64; D]) -> Option<Point<D>> {
     let largest = (0..D).fold(0.0_f64, |most, i| most.max(matrix[i][i]));
     for i in 0..D {

@@ -1,15 +1,15 @@
-//! How much flows between two cells for a unit of difference between their pressures.
+//! The flow between two cells per unit of difference between their pressures.
 
 use atomesh::mesh::{Connection, PolyMesh, connections};
 
 use crate::error::FlowError;
 use crate::permeability::Permeability;
 
-/// The sine of the angle between a face's normal and the line between its sites may be this large, weighted by the
-/// face's share of the cell's surface, V^((D−1)/D). Rounding alone makes 10⁻⁹.
+/// The largest sine of the angle between a face's normal and the line between its sites, times the face's share of the
+/// cell's surface V^((D−1)/D). Rounding alone makes 10⁻⁹.
 const SKEWED: f64 = 1e-6;
 
-/// A face this small, as a share of the surface, has a plane that is lost to rounding.
+/// The share of the surface up to which rounding makes a face's plane meaningless.
 const THIN: f64 = 1e-4;
 
 /// The transmissibility of each face between two cells, in the mesh's order: `m · A / (d₁/k₁ + d₂/k₂)`, with the
@@ -20,8 +20,8 @@ const THIN: f64 = 1e-4;
 /// [`Setting::multipliers`](crate::Setting::multipliers). Unit: that of permeability × length^(D−2).
 ///
 /// # Errors
-/// [`FlowError::Tensor`] for a permeability of tensors; [`FlowError::Skewed`] names two cells whose face does not
-/// stand at a right angle to the line between their sites.
+/// [`FlowError::Tensor`] for a permeability of tensors; [`FlowError::Skewed`] names two cells whose face is not
+/// normal to the line between their sites.
 ///
 /// # Panics
 /// If there are fewer multipliers than faces between two cells.
@@ -39,7 +39,7 @@ pub fn transmissibilities<const D: usize>(
             return Err(FlowError::Skewed { cells: own.cells, cosine: own.orthogonality });
         }
         let k = [number(own.cells[0])?, number(own.cells[1])?];
-        // the plane of a face as thin as that is rounding; it lies in the middle between the sites
+        // the plane of so thin a face is rounding; the true one is halfway between the sites
         let distances = if is_thin { [0.5 * apart(cells, own); 2] } else { own.distances };
         let resistance = distances[0] / k[0] + distances[1] / k[1];
         Ok(multipliers[face] * own.area / resistance)

@@ -1,4 +1,4 @@
-//! Wells: the radius at which the pressure around a well is that of its cell.
+//! The equivalent radius of wells: that at which the pressure around a well is its cell's.
 
 use std::f64::consts::TAU;
 
@@ -9,13 +9,13 @@ use atomesh::watch::Silent;
 use crate::error::FlowError;
 use crate::problem::Control;
 use crate::setting::{PlacedWell, Setting, well_index};
-use crate::solve::{Method, SolveOptions, Sparse, System, solve};
+use crate::solve::{SolveMethod, SolveOptions, Sparse, System, solve};
 
-/// How many rings of cells around a well [`solve`](super::solve()) looks at for its equivalent radius. Measured: on
-/// squares 8 rings come within 0.1 % of what infinitely many give, 1 ring within 5 %.
+/// Rings of cells around a well from which [`solve`](super::solve()) computes its equivalent radius. Measured: on
+/// squares 8 rings are within 0.1 % of infinitely many, 1 ring within 5 %.
 pub const RINGS: usize = 8;
 
-/// A site nearer to the plane of a face than this share of its cell's width lies on it.
+/// Distance from a face's plane, as a share of the cell's width, up to which a site lies on the plane.
 const ON_FACE: f64 = 1e-11;
 
 /// A well with its cell.
@@ -25,12 +25,12 @@ pub(super) struct Coupling {
     pub well: usize,
     /// The cell that it flows into.
     pub cell: u32,
-    /// What flows into the box for a unit of difference between wall and cell, on a side half of what a well
-    /// brings elsewhere; of wells that have a radius.
+    /// The flow into the box per unit of pressure difference between wall and cell, for wells with a radius; on a side
+    /// half of that elsewhere.
     pub index: Option<f64>,
 }
 
-/// Joins wells to cells. A well of given rate needs no radius.
+/// Couples wells to cells. A well of given rate needs no radius.
 pub(super) fn couple<const D: usize>(
     cells: &PolyMesh<D>,
     setting: &Setting<'_, D>,
@@ -57,17 +57,17 @@ pub(super) fn couple<const D: usize>(
 
 /// The radius at which the pressure around a well in a cell is that of the cell.
 ///
-/// Around the well the pressure is −ln r/2π (2-D) or 1/4πr (3-D), for a rate and permeability of 1, and something
-/// smooth. Cells that are `rings` faces away are given that pressure at their sites, cells nearer are solved
-/// for, and the pressure that the well's cell comes to has is read as a radius. With 1 ring that is the radius of
-/// Peaceman (1978) on any cells (Palagi & Aziz 1994), `ln r_e = (Σ T_j ln d_j − θ) / Σ T_j` with
-/// `T_j = A_j/d_j`, d_j to the neighbours' sites and θ the angle under which the well sees its neighbours, less
-/// than 2π beside the box; in 3-D `1/r_e = (θ + Σ T_j/d_j) / Σ T_j`, θ the solid angle. It takes the neighbours'
-/// pressures for exact: e^(−π/2) d = 0.2079 d on squares of side d, e^(−π/√3) d = 0.1630 d on hexagons. They are
-/// not quite; more rings come to what the discrete equations really give, e^(−γ)/√8 d = 0.1985 d and
-/// e^(−γ)/√12 d = 0.1621 d, γ Euler's constant (Peaceman 1978 finds 0.1982 by refinement).
+/// For a rate and permeability of 1 the pressure around the well is −ln r/2π (plane) or 1/4πr (space), plus a smooth
+/// part. Cells `rings` faces away are given that pressure at their sites, nearer cells are solved for, and the
+/// pressure of the well's cell is converted to a radius. With 1 ring it is the radius of Peaceman (1978) on any cells
+/// (Palagi & Aziz 1994), `ln r_e = (Σ T_j ln d_j − θ) / Σ T_j`, with `T_j = A_j/d_j`, d_j the distances of the
+/// neighbours' sites and θ the angle that the neighbours fill as seen from the well, below 2π if it lies on a side; in
+/// space `1/r_e = (θ + Σ T_j/d_j) / Σ T_j`, θ the solid angle. 1 ring takes the neighbours' pressures as exact:
+/// e^(−π/2) d = 0.2079 d on squares of side d, e^(−π/√3) d = 0.1630 d on hexagons. More rings converge to the radius of
+/// the discrete equations, e^(−γ)/√8 d = 0.1985 d and e^(−γ)/√12 d = 0.1621 d, γ Euler's constant (Peaceman 1978 finds
+/// 0.1982 by refinement).
 ///
-/// Barriers do not matter: beside a straight one the image well's share is the smooth part's.
+/// Barriers do not matter: the image well beyond a straight barrier belongs to the smooth part.
 ///
 /// # Errors
 /// [`FlowError::Solve`] if the equations of the rings cannot be solved.
@@ -84,14 +84,14 @@ pub fn equivalent_radius<const D: usize>(
     around.radius()
 }
 
-/// The cells around a well.
+/// Rings of cells around a well.
 struct Around<'a, const D: usize> {
     cells: &'a PolyMesh<D>,
     /// The well's place.
     site: Point<D>,
-    /// The cells ring after ring.
+    /// The cells, ring after ring, from the well's own.
     found: Vec<u32>,
-    /// Where the last ring starts, whose pressures are given.
+    /// The number of cells before the last ring, whose pressures are given.
     unknown_count: usize,
 }
 
@@ -121,7 +121,7 @@ impl<'a, const D: usize> Around<'a, D> {
         Self { cells, site: cells.centers()[cell], found, unknown_count }
     }
 
-    /// The share of the whole angle that the well sees of the box: 1, or 1/2 from a side of it.
+    /// The share of the whole angle that the box fills as seen from the well: 1 inside, 1/2 on a side.
     fn open(&self) -> f64 {
         let faces = self.cells.faces_of(self.found[0] as usize);
         faces.map(|(face, sign)| self.share_seen(face, sign)).sum()
@@ -150,7 +150,7 @@ impl<'a, const D: usize> Around<'a, D> {
             places: &places,
             coarse: None,
         };
-        let options = SolveOptions { method: Method::Direct, ..SolveOptions::default() };
+        let options = SolveOptions { method: SolveMethod::Direct, ..SolveOptions::default() };
         Ok(solve(&system, &options, &mut Silent)?.0[0])
     }
 
@@ -188,7 +188,7 @@ impl<'a, const D: usize> Around<'a, D> {
         (dot(&area, &area) / distance_squared(a, b)).sqrt()
     }
 
-    /// The pressure of the well at a site.
+    /// The pressure that the well causes at a site.
     fn field(&self, cell: u32) -> f64 {
         let squared = distance_squared(&self.site, &self.cells.centers()[cell as usize]);
         match D {
@@ -197,8 +197,8 @@ impl<'a, const D: usize> Around<'a, D> {
         }
     }
 
-    /// The share of the well's rate that flows through a face outward: that of the whole angle under which the
-    /// well sees it from inside.
+    /// The share of the well's rate that flows outward through a face: the face's share of the whole angle, as seen from
+    /// the well.
     fn share_seen(&self, face: usize, sign: f64) -> f64 {
         let area = self.cells.area_vector(face);
         let length = dot(&area, &area).sqrt();
@@ -214,7 +214,7 @@ impl<'a, const D: usize> Around<'a, D> {
     }
 }
 
-/// The angle (2-D) or solid angle (3-D; van Oosterom & Strackee 1983) of a segment or triangle seen from a place.
+/// The angle of a segment (plane), or solid angle of a triangle (space; van Oosterom & Strackee 1983), from a place.
 fn view_angle<const D: usize>(simplex: &[Point<D>; D], from: &Point<D>) -> f64 {
     const { assert!(D == 2 || D == 3) };
     let rays = simplex.map(|corner| difference(&corner, from));

@@ -3,10 +3,13 @@
 use atomesh::geometry::dot;
 use atomesh::image::{Frame, Image, Samples};
 
-use super::{AnyImage, ImageFormat, ReadNote, ReadReason};
+use super::any_image::AnyImage;
+use super::error::ReadReason;
+use super::format::ImageFormat;
+use super::note::ReadNote;
 
-/// The least |cosine| of the angle between two axes at which they count as sheared: what a
-/// [`Frame`] tolerates, 0.006 degrees.
+/// The greatest |cosine| of the angle between two axes that a [`Frame`] tolerates, 0.006 degrees off; beyond
+/// it they are sheared.
 const SHEAR: f64 = 1e-4;
 
 /// Which way the axes of a header's world point. Ours is RAS, x to the right, y to the front, z to the
@@ -61,22 +64,10 @@ impl Affine {
         }
         self
     }
-
-    /// The affine of a frame; that of a flat one lies in the plane z = 0.
-    pub fn of<const D: usize>(frame: &Frame<D>) -> Self {
-        let mut affine = Self::scaling([1.0; 3]);
-        for r in 0..D {
-            affine.origin[r] = frame.origin()[r];
-            for c in 0..D {
-                affine.matrix[r][c] = frame.direction()[r][c] * frame.spacing()[c];
-            }
-        }
-        affine
-    }
 }
 
-/// The image of the samples that `read` gives, placed by an affine. The frame is made first, so that
-/// a bad one is reported before the long read.
+/// The image of the samples that `read` returns, placed by an affine. The frame is made first, so that a bad
+/// one is reported before the long read.
 ///
 /// # Errors
 /// As [`frame`] and [`flat_frame`], and as `read` gives.
@@ -186,85 +177,19 @@ fn orthonormal<const D: usize>(columns: [[f64; D]; D]) -> [[f64; D]; D] {
     columns
 }
 
-/// The rotation of the unit quaternion (√(1 − b² − c² − d²), b, c, d), as the format defines it.
-///
-/// # Errors
-/// If b² + c² + d² is not finite or exceeds 1 by more than single precision explains.
-pub(super) fn rotation(quaternion: [f64; 3]) -> Result<[[f64; 3]; 3], ReadReason> {
-    let squared = dot(&quaternion, &quaternion);
-    if squared.is_nan() || squared > 1.0 + 1e-5 {
-        let value = format!("{quaternion:?}");
-        let expected = "numbers whose squares add up to at most 1";
-        return Err(wrong(ImageFormat::Nifti, "quatern_b, c, d", value, expected));
-    }
-    let scale = if squared > 1.0 { squared.sqrt().recip() } else { 1.0 };
-    let [b, c, d] = quaternion.map(|q| q * scale);
-    let a = (1.0 - dot(&[b, c, d], &[b, c, d])).max(0.0).sqrt();
-    Ok([
-        [a * a + b * b - c * c - d * d, 2.0 * (b * c - a * d), 2.0 * (b * d + a * c)],
-        [2.0 * (b * c + a * d), a * a + c * c - b * b - d * d, 2.0 * (c * d - a * b)],
-        [2.0 * (b * d - a * c), 2.0 * (c * d + a * b), a * a + d * d - b * b - c * c],
-    ])
-}
-
-/// The quaternion (b, c, d) of a frame's direction and qfac, −1 if its z axis is mirrored.
-pub(super) fn quaternion<const D: usize>(frame: &Frame<D>) -> ([f64; 3], f64) {
-    let mut m = Affine::scaling([1.0; 3]).matrix;
-    for r in 0..D {
-        m[r][..D].copy_from_slice(&frame.direction()[r]);
-    }
-    let qfac = if frame.is_mirrored() { -1.0 } else { 1.0 };
-    m.iter_mut().for_each(|row| row[2] *= qfac);
-
-    // the largest of the four components is found first and divides the others
-    let trace = m[0][0] + m[1][1] + m[2][2];
-    let quarters = [trace, m[0][0], m[1][1], m[2][2]];
-    let largest = (1..4).fold(0, |best, k| if quarters[k] > quarters[best] { k } else { best });
-    let [a, b, c, d] = match largest {
-        0 => [1.0 + trace, m[2][1] - m[1][2], m[0][2] - m[2][0], m[1][0] - m[0][1]],
-        1 => [m[2][1] - m[1][2], 1.0 + 2.0 * m[0][0] - trace, m[0][1] + m[1][0], m[0][2] + m[2][0]],
-        2 => [m[0][2] - m[2][0], m[0][1] + m[1][0], 1.0 + 2.0 * m[1][1] - trace, m[1][2] + m[2][1]],
-        _ => [m[1][0] - m[0][1], m[0][2] + m[2][0], m[1][2] + m[2][1], 1.0 + 2.0 * m[2][2] - trace],
-    };
-    let norm = (a * a + b * b + c * c + d * d).sqrt();
-    let sign = if a < 0.0 { -1.0 } else { 1.0 }; // the format has no room for a negative a
-    ([b, c, d].map(|q| sign * q / norm), qfac)
-}
-
 #[cfg(test)]
 mod tests {
+    use super::super::nifti::rotation;
     use super::*;
     use proptest::prelude::*;
 
-    const NIFTI: ImageFormat = ImageFormat::Nifti;
-
-    #[test]
-    fn quarter_turns_are_exact() {
-        // about z: x goes to y
-        let half = 0.5f64.sqrt();
-        let r = rotation([0.0, 0.0, half]).unwrap();
-        let expected = [[0.0, -1.0, 0.0], [1.0, 0.0, 0.0], [0.0, 0.0, 1.0]];
-        for (row, wanted) in r.iter().zip(expected) {
-            for (x, w) in row.iter().zip(wanted) {
-                assert!((x - w).abs() < 1e-15, "{r:?}");
-            }
-        }
-    }
-
-    #[test]
-    fn impossible_quaternions_are_refused_and_rounded_ones_taken() {
-        assert!(rotation([1.0, 0.1, 0.0]).is_err());
-        assert!(rotation([f64::NAN, 0.0, 0.0]).is_err());
-        assert!(rotation([f64::INFINITY, 0.0, 0.0]).is_err());
-        let turned = rotation([1.000_001, 0.0, 0.0]).unwrap();
-        assert_eq!(turned, [[1.0, 0.0, 0.0], [0.0, -1.0, 0.0], [0.0, 0.0, -1.0]]);
-    }
+    const FORMAT: ImageFormat = ImageFormat::named("test");
 
     #[test]
     fn shear_is_refused_with_its_angle() {
         let mut affine = Affine::scaling([1.0, 2.0, 3.0]);
         affine.matrix[0][1] = 2.0; // y leans by 45 degrees
-        match frame(NIFTI, [2, 2, 2], affine) {
+        match frame(FORMAT, [2, 2, 2], affine) {
             Err(ReadReason::Sheared { first: 0, second: 1, degrees }) => {
                 assert!((degrees - 45.0).abs() < 1e-12);
             }
@@ -275,50 +200,25 @@ mod tests {
     #[test]
     fn degenerate_columns_are_refused() {
         for bad in [0.0, f64::NAN, f64::INFINITY, 1e300] {
-            let error = frame(NIFTI, [2, 2, 2], Affine::scaling([1.0, bad, 1.0])).unwrap_err();
+            let error = frame(FORMAT, [2, 2, 2], Affine::scaling([1.0, bad, 1.0])).unwrap_err();
             assert!(error.to_string().contains("affine column y"), "{error}");
         }
         let mut affine = Affine::scaling([1.0; 3]);
         affine.origin[2] = f64::NAN;
-        assert!(frame(NIFTI, [2, 2, 2], affine).is_err());
+        assert!(frame(FORMAT, [2, 2, 2], affine).is_err());
     }
 
     #[test]
     fn a_flat_image_stays_in_its_plane() {
         let mut affine = Affine::scaling([2.0, 3.0, 1.0]);
         affine.origin = [1.0, 2.0, 9.0];
-        let flat = flat_frame(NIFTI, [4, 5], affine).unwrap();
+        let flat = flat_frame(FORMAT, [4, 5], affine).unwrap();
         assert_eq!((flat.spacing(), flat.origin()), ([2.0, 3.0], [1.0, 2.0]));
         affine.matrix[2][1] = 0.5;
-        assert!(flat_frame(NIFTI, [4, 5], affine).unwrap_err().to_string().contains("row z"));
+        assert!(flat_frame(FORMAT, [4, 5], affine).unwrap_err().to_string().contains("row z"));
     }
 
     proptest! {
-        /// Any rotation or reflection goes through the quaternion and back. Tolerance: a few
-        /// roundings; where a is small it is √ of a difference, whence √ε.
-        #[test]
-        fn directions_survive_the_quaternion(
-            q in prop::array::uniform4(-1.0f64..1.0), mirrored: bool,
-        ) {
-            let norm = q.iter().map(|x| x * x).sum::<f64>().sqrt();
-            prop_assume!(norm > 0.1);
-            let sign = if q[3] < 0.0 { -1.0 } else { 1.0 };
-            let mut direction =
-                rotation([q[0], q[1], q[2]].map(|x| sign * x / norm)).unwrap();
-            if mirrored {
-                direction.iter_mut().for_each(|row| row[1] = -row[1]);
-            }
-            let frame = Frame::new([2, 2, 2]).unwrap().with_direction(direction).unwrap();
-            let (quaternion, qfac) = quaternion(&frame);
-            let mut back = rotation(quaternion).unwrap();
-            back.iter_mut().for_each(|row| row[2] *= qfac);
-            for r in 0..3 {
-                for c in 0..3 {
-                    prop_assert!((back[r][c] - direction[r][c]).abs() < 1e-7);
-                }
-            }
-        }
-
         /// Directions rounded to single precision become orthonormal in double precision.
         #[test]
         fn frames_of_rounded_affines_map_there_and_back(
@@ -329,7 +229,7 @@ mod tests {
             affine.matrix = std::array::from_fn(|r| std::array::from_fn(|c| {
                 f64::from((turn[r][c] * spacing[c]) as f32)
             }));
-            let direction = frame(NIFTI, [2, 2, 2], affine).unwrap().direction();
+            let direction = frame(FORMAT, [2, 2, 2], affine).unwrap().direction();
             for a in 0..3 {
                 for b in 0..3 {
                     let dot: f64 = (0..3).map(|r| direction[r][a] * direction[r][b]).sum();

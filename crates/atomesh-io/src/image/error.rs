@@ -7,7 +7,9 @@ use std::path::PathBuf;
 use atomesh::image::FrameError;
 use atomesh::watch::Cancelled;
 
-use super::{ImageFormat, SampleType, SeriesError};
+use super::format::ImageFormat;
+use super::sample_type::SampleType;
+use super::series_error::SeriesError;
 
 /// An image could not be read; the message names the file and the reason.
 #[derive(Debug, thiserror::Error)]
@@ -40,13 +42,14 @@ pub enum ReadReason {
     },
     /// The file's name ends like no format that is known.
     #[error(
-        "no image format is known by the ending {extension:?}; known are {}, and any file as raw \
-         samples when shape and type are given",
-        ImageFormat::EXTENSIONS.join(" ")
+        "no image format is known by the ending {extension:?}; known are {known}, and any file as raw \
+         samples when shape and type are given"
     )]
     UnknownExtension {
         /// The ending found, empty if there is none.
         extension: String,
+        /// The endings that are known, parted by blanks.
+        known: String,
     },
     /// The name ends in `.raw`, and no layout was given.
     #[error("raw samples say neither their shape nor their type: both must be given")]
@@ -58,12 +61,14 @@ pub enum ReadReason {
         format: ImageFormat,
     },
     /// The file does not begin as its format does.
-    #[error("begins with the bytes {found:02x?}, unlike {format}{}", hint(found))]
+    #[error("begins with the bytes {found:02x?}, unlike {format}{}", hint(found, *.like))]
     Magic {
         /// The format that the name promises.
         format: ImageFormat,
         /// The first bytes found.
         found: Vec<u8>,
+        /// The format whose files begin with these bytes, if there is one.
+        like: Option<ImageFormat>,
     },
     /// The samples end early.
     #[error("the file is cut short: {found} of {expected} samples are there")]
@@ -231,16 +236,13 @@ impl ReadReason {
 }
 
 /// What the first bytes say about a file with the wrong name.
-fn hint(head: &[u8]) -> &'static str {
-    match head {
-        [0x1f, 0x8b, ..] => ": compressed by gzip, so a name in .nii.gz might be right",
-        [0x89, b'P', b'N', b'G', ..] => ": like PNG",
-        [0xff, 0xd8, 0xff, ..] => ": like JPEG",
-        [b'I', b'I', 42 | 43, 0, ..] | [b'M', b'M', 0, 42 | 43, ..] => ": like TIFF",
-        [0x93, b'N', b'U', b'M', ..] => ": like NPY",
-        [0x89, b'H', b'D', b'F', ..] => ": like HDF5",
-        [b'P', b'K', 3, 4, ..] => ": like ZIP or NPZ",
-        _ => "",
+fn hint(head: &[u8], like: Option<ImageFormat>) -> String {
+    match (head, like) {
+        ([0x1f, 0x8b, ..], _) => ": compressed by gzip, so a name in .nii.gz might be right".into(),
+        (_, Some(format)) => format!(": like {format}"),
+        ([0x89, b'H', b'D', b'F', ..], _) => ": like HDF5".into(),
+        ([b'P', b'K', 3, 4, ..], _) => ": like ZIP or NPZ".into(),
+        _ => String::new(),
     }
 }
 
@@ -266,13 +268,12 @@ pub enum WriteReason {
     #[error("cannot be written: {0}")]
     Io(#[from] io::Error),
     /// The file's name ends like no format that can be written.
-    #[error(
-        "no image can be written by the ending {extension:?}; writable are \
-         .npy .nii .nii.gz .nrrd .vti .png .tif .tiff .raw"
-    )]
+    #[error("no image can be written by the ending {extension:?}; writable are {known}")]
     UnknownExtension {
         /// The ending found, empty if there is none.
         extension: String,
+        /// The endings that can be written, parted by blanks.
+        known: String,
     },
     /// The format has no room for samples of this type.
     #[error("{format} does not hold {sample_type} samples, only {expected}")]

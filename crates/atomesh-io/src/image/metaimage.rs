@@ -7,16 +7,29 @@
 //! either they stand as they are. The letters of `AnatomicalOrientation` say nothing that the matrix
 //! does not; ITK ignores them too.
 
-use std::io::{BufReader, Read};
-use std::path::Path;
+use std::io::BufReader;
 
 use super::affine::{self, Affine, World};
+use super::codec::{Begins, Codec, Source};
+use super::error::ReadReason;
+use super::format::ImageFormat;
+use super::note::LoadedImage;
 use super::payload::{Encoding, Payload, pattern_names};
+use super::sample_type::{ByteOrder, SampleType};
+use super::spelling;
 use super::text::{Lines, numbers, shortened};
-use super::watched::Watched;
-use super::{ByteOrder, ImageFormat, LoadedImage, ReadReason, SampleType};
 
-const FORMAT: ImageFormat = ImageFormat::MetaImage;
+const FORMAT: ImageFormat = ImageFormat::named("MetaImage");
+
+pub(super) const CODEC: Codec = Codec {
+    endings: &[".mha"],
+    header_endings: &[".mhd"],
+    // with a word of text
+    begins: Begins::If(|head| head.iter().all(|b| b.is_ascii_graphic() || b.is_ascii_whitespace())),
+    has_frame: true,
+    z_is_height: true,
+    ..Codec::reading(FORMAT, read)
+};
 
 /// The entry that ends a header.
 const LAST: &str = "ElementDataFile";
@@ -29,12 +42,9 @@ fn unsupported(found: String, expected: &'static str) -> ReadReason {
     ReadReason::Unsupported { format: FORMAT, found, expected }
 }
 
-/// Reads a `.mha` or `.mhd` file that stands in `folder`, if it stands in one.
-pub(super) fn read<R: Read>(
-    source: Watched<R>,
-    file_bytes: u64,
-    folder: Option<&Path>,
-) -> Result<LoadedImage, ReadReason> {
+/// Reads a `.mha` or `.mhd` file.
+fn read(source: Source) -> Result<LoadedImage, ReadReason> {
+    let Source { bytes: source, length: file_bytes, folder, .. } = source;
     let mut source = BufReader::with_capacity(1 << 16, source);
     let mut lines = Lines::new(&mut source);
     let entries = Entries::read(&mut lines)?;
@@ -158,20 +168,8 @@ impl Entries {
 
     fn sample_type(&self) -> Result<SampleType, ReadReason> {
         let name = self.get(&["ElementType"]).unwrap_or("missing");
-        Ok(match name {
-            "MET_UCHAR" | "MET_ASCII_CHAR" => SampleType::U8,
-            "MET_CHAR" => SampleType::I8,
-            "MET_USHORT" => SampleType::U16,
-            "MET_SHORT" => SampleType::I16,
-            // 4 bytes, whatever a machine's long has
-            "MET_UINT" | "MET_ULONG" => SampleType::U32,
-            "MET_INT" | "MET_LONG" => SampleType::I32,
-            "MET_ULONG_LONG" => SampleType::U64,
-            "MET_LONG_LONG" => SampleType::I64,
-            "MET_FLOAT" => SampleType::F32,
-            "MET_DOUBLE" => SampleType::F64,
-            _ => return Err(wrong("ElementType", name, "MET_CHAR ... MET_DOUBLE, no array")),
-        })
+        let found = spelling::named(name, |own| own.meta_image);
+        found.ok_or_else(|| wrong("ElementType", name, "MET_CHAR ... MET_DOUBLE, no array"))
     }
 
     /// The files that hold the samples, if it is not this one.

@@ -1,12 +1,12 @@
 //! Image files: bytes to [`Image`] and back, one file per format.
 //!
-//! The ending of the name chooses the format, and the first bytes must agree. Each reader checks
-//! what the header promises against the size of the file before it makes room, then streams the
-//! samples into the one vector that will hold them, in the type in which the file has them.
+//! `table` lists the formats. A file's ending chooses one, and its first bytes must agree. Each reader
+//! checks what the header promises against the size of the file before it allocates memory, then streams
+//! the samples into the one vector that will hold them, in the file's own type.
 //!
 //! | format | endings | samples | frame |
 //! | --- | --- | --- | --- |
-//! | PNG, JPEG, PNM | png, jpg jpeg, pnm pgm ppm pbm pam | 8 and 16 bits; colour to luminance | none |
+//! | PNG, JPEG, PNM | png, jpg jpeg, pgm ppm pbm pnm pam | 8 and 16 bits; colour to luminance | none |
 //! | TIFF | tif tiff | integers, floats; many pages are a volume | none |
 //! | NPY | npy | every real type; arrays (y, x) or (z, y, x) | none |
 //! | NIfTI-1 | nii nii.gz | every real type; one volume | sform, else qform, else spacing |
@@ -14,24 +14,24 @@
 //! | MetaImage | mha, mhd | every real type; zlib | LPS turned to RAS where the file speaks of a body |
 //! | NRRD | nrrd, nhdr | every real type; gzip, ascii | LPS, LAS turned to RAS; others as they are |
 //! | VTI | vti | every real type; zlib, base64, ascii | as it is |
-//! | SEG-Y | sgy segy | IBM and IEEE floats, integers; lines and cubes | by coordinates and interval |
+//! | SEG-Y | segy sgy | IBM and IEEE floats, integers; lines and cubes | by coordinates and interval |
 //! | RSF | rsf | floats, integers; native, XDR, ASCII | o and d of each axis |
 //! | raw | raw, or any with a layout | every real type | none |
 //!
 //! World coordinates are those that the file states, with one exception. Files of bodies state them in
 //! RAS (x to the right, y to the front, z to the head: NIfTI) or in LPS (x to the left, y to the back:
-//! DICOM, and what ITK writes), half a turn apart. All of these are read as RAS, so that a scan lies in
-//! the same place whatever file it comes in:
+//! DICOM, and what ITK writes), half a turn apart. All are read as RAS, so that a scan lies in the same
+//! place whatever its format:
 //!
 //! | file | its world | read as |
 //! | --- | --- | --- |
-//! | NIfTI-1 | RAS | it stands |
+//! | NIfTI-1 | RAS | it is |
 //! | DICOM | LPS | turned to RAS |
 //! | NRRD, `space` right-, left-anterior-superior, left-posterior-superior | as named | turned to RAS |
-//! | NRRD, any other `space` or none | unknown | it stands |
+//! | NRRD, any other `space` or none | unknown | it is |
 //! | MetaImage with `AnatomicalOrientation` or a medical `Modality` | LPS | turned to RAS |
-//! | MetaImage with neither | unknown | it stands |
-//! | VTI | unknown | it stands |
+//! | MetaImage with neither | unknown | it is |
+//! | VTI | unknown | it is |
 //!
 //! Meshes and images are written in the same coordinates: NIfTI and NRRD say RAS, VTI and mesh formats
 //! have no word for it. Flat images of NRRD and MetaImage stand as they are, unless they name a body.
@@ -41,125 +41,58 @@
 
 use std::cell::Cell;
 use std::fs::File;
-use std::io::{Cursor, Read, Seek};
+use std::io::Cursor;
 use std::path::Path;
 
-use atomesh::image::{Frame, FrameError, Image, Range, Samples};
+use atomesh::image::Image;
 use atomesh::watch::{Cancelled, Phase, Watch, check};
 
 use crate::atomic_file::AtomicFile;
 
 mod affine;
+mod any_image;
+mod codec;
+mod colour;
 mod dicom;
 mod error;
 mod format;
+mod jpeg;
 mod metaimage;
 mod nifti;
 mod note;
 mod npy;
 mod nrrd;
+mod options;
 mod payload;
-mod raster;
+mod png;
+mod pnm;
 mod raw;
 mod rsf;
 mod sample_type;
 mod segy;
+mod series_error;
+mod shape;
+mod spelling;
 mod stream;
+mod table;
 mod text;
 mod tiff;
 mod traces;
+mod view;
 mod vti;
 mod watched;
 
-pub use dicom::SeriesError;
+pub use any_image::AnyImage;
+use codec::{Input, Source};
 pub use error::{ReadError, ReadReason, WriteError, WriteReason};
 pub use format::ImageFormat;
-use format::extension;
 pub use note::{LoadedImage, ReadNote};
-pub use raw::RawLayout;
+pub use options::{RawLayout, ReadOptions, SegyOptions, Vertical};
 pub use sample_type::{ByteOrder, SampleType, UnknownByteOrder, UnknownSampleType};
-pub use segy::{SegyOptions, Vertical};
+pub use series_error::SeriesError;
+use table::extension;
+use view::ImageView;
 use watched::Watched;
-
-/// An image whose file decided whether it is flat or a volume.
-#[derive(Clone, Debug)]
-pub enum AnyImage {
-    /// Two axes.
-    Flat(Image<2>),
-    /// Three axes, also where one of them has a single sample.
-    Volume(Image<3>),
-}
-
-/// Runs the same expression on an image of either dimension.
-macro_rules! either {
-    ($any:expr, $image:ident => $body:expr) => {
-        match $any {
-            AnyImage::Flat($image) => $body,
-            AnyImage::Volume($image) => $body,
-        }
-    };
-}
-
-impl AnyImage {
-    /// An image without a frame; `shape` has two or three axes, x first.
-    fn frameless(shape: &[usize], samples: Samples) -> Result<Self, ReadReason> {
-        match *shape {
-            [nx, ny] => Ok(Self::Flat(Image::new(Frame::new([nx, ny])?, samples)?)),
-            [nx, ny, nz] => Ok(Self::Volume(Image::new(Frame::new([nx, ny, nz])?, samples)?)),
-            _ => Err(FrameError::Shape { shape: shape.to_vec() }.into()),
-        }
-    }
-
-    /// The number of axes, 2 or 3.
-    pub fn dimension(&self) -> usize {
-        self.shape().len()
-    }
-
-    /// Samples along x, y (and z).
-    pub fn shape(&self) -> Vec<usize> {
-        either!(self, i => i.frame().shape().to_vec())
-    }
-
-    /// World units from one sample to the next along each axis.
-    pub fn spacing(&self) -> Vec<f64> {
-        either!(self, i => i.frame().spacing().to_vec())
-    }
-
-    /// The world coordinates of sample 0.
-    pub fn origin(&self) -> Vec<f64> {
-        either!(self, i => i.frame().origin().to_vec())
-    }
-
-    /// The world directions of the axes: one row for each world axis, a column for each of ours.
-    pub fn direction(&self) -> Vec<Vec<f64>> {
-        either!(self, i => i.frame().direction().iter().map(|row| row.to_vec()).collect())
-    }
-
-    /// The sample values, x fastest.
-    pub fn samples(&self) -> &Samples {
-        either!(self, i => i.samples())
-    }
-
-    /// The name of the sample type, as NumPy spells it.
-    pub fn type_name(&self) -> &'static str {
-        self.samples().type_name()
-    }
-
-    /// The least and greatest sample, and the count of those that are not finite.
-    pub fn range(&self) -> Range {
-        self.samples().range()
-    }
-}
-
-/// How to read an image.
-#[derive(Clone, Debug, Default)]
-pub struct ReadOptions {
-    /// The layout of raw samples; if given, the file is read as raw whatever its name is.
-    /// Default: none.
-    pub raw: Option<RawLayout>,
-    /// What a SEG-Y file may not say; of RSF files, whether the first axis is vertical.
-    pub segy: SegyOptions,
-}
 
 /// Reads an image from a file, in the format that its name promises.
 ///
@@ -195,26 +128,32 @@ pub fn load_image(
     options: &ReadOptions,
     watch: &mut dyn Watch,
 ) -> Result<LoadedImage, ReadError> {
-    let mut read = || {
-        let format = match (&options.raw, ImageFormat::of(path)) {
-            (Some(_), _) => ImageFormat::Raw,
-            (None, Some(format)) => format,
-            (None, None) => {
-                return Err(ReadReason::UnknownExtension { extension: extension(path) });
-            }
-        };
-        let file = File::open(path).map_err(ReadReason::Io)?;
-        let metadata = file.metadata().map_err(ReadReason::Io)?;
-        if metadata.is_dir() && format == ImageFormat::Dicom {
-            return dicom::read_folder(path, watch);
+    load(path, options, watch).map_err(|reason| ReadError { path: path.into(), reason })
+}
+
+fn load(
+    path: &Path,
+    options: &ReadOptions,
+    watch: &mut dyn Watch,
+) -> Result<LoadedImage, ReadReason> {
+    let format = match (&options.raw, ImageFormat::of(path)) {
+        (Some(_), _) => ImageFormat::RAW,
+        (None, Some(format)) => format,
+        (None, None) => {
+            let known = ImageFormat::endings().collect::<Vec<_>>().join(" ");
+            return Err(ReadReason::UnknownExtension { extension: extension(path), known });
         }
-        if metadata.is_dir() {
-            return Err(ReadReason::Io(std::io::ErrorKind::IsADirectory.into()));
-        }
-        let file = Source { bytes: file, length: metadata.len(), folder: Some(folder_of(path)) };
-        decode(file, format, options, watch)
     };
-    read().map_err(|reason| ReadError { path: path.into(), reason })
+    let mut file = File::open(path).map_err(ReadReason::Io)?;
+    let metadata = file.metadata().map_err(ReadReason::Io)?;
+    if metadata.is_dir() {
+        return match &format.codec().folder {
+            Some(folder) => (folder.read)(path, watch),
+            None => Err(ReadReason::Io(std::io::ErrorKind::IsADirectory.into())),
+        };
+    }
+    let file = Stored { bytes: &mut file, length: metadata.len(), folder: path.parent() };
+    decode(file, format, options, watch)
 }
 
 /// Reads an image from the bytes of a file.
@@ -227,63 +166,49 @@ pub fn decode_image(
     options: &ReadOptions,
     watch: &mut dyn Watch,
 ) -> Result<AnyImage, ReadReason> {
-    let source = Source { bytes: Cursor::new(bytes), length: bytes.len() as u64, folder: None };
-    decode(source, format, options, watch).map(|loaded| loaded.image)
+    load_bytes(bytes, format, options, watch).map(|loaded| loaded.image)
 }
 
-/// Where an image is read from.
-struct Source<'a, R> {
-    bytes: R,
-    /// The number of bytes in all.
-    length: u64,
-    /// The folder in which other files of the image stand, if it is known.
-    folder: Option<&'a Path>,
-}
-
-/// The folder of a file.
-fn folder_of(path: &Path) -> &Path {
-    path.parent().unwrap_or(Path::new(""))
-}
-
-/// Reads an image.
-fn decode<R: Read + Seek>(
-    source: Source<R>,
+fn load_bytes(
+    bytes: &[u8],
     format: ImageFormat,
     options: &ReadOptions,
     watch: &mut dyn Watch,
 ) -> Result<LoadedImage, ReadReason> {
-    let Source { bytes: mut source, length: file_bytes, folder } = source;
-    if file_bytes == 0 {
+    let mut cursor = Cursor::new(bytes);
+    let stored = Stored { bytes: &mut cursor, length: bytes.len() as u64, folder: None };
+    decode(stored, format, options, watch)
+}
+
+/// The bytes of a file, their number, and the folder that the file stands in, if it is known.
+struct Stored<'a> {
+    bytes: &'a mut dyn Input,
+    length: u64,
+    folder: Option<&'a Path>,
+}
+
+fn decode(
+    stored: Stored,
+    format: ImageFormat,
+    options: &ReadOptions,
+    watch: &mut dyn Watch,
+) -> Result<LoadedImage, ReadReason> {
+    let Stored { bytes, length, folder } = stored;
+    if length == 0 {
         return Err(ReadReason::Empty { format });
     }
+    let codec = format.codec();
     let mut head = [0; 8];
-    let count = stream::fill(&mut source, &mut head)?;
-    if !format.may_begin_with(&head[..count]) {
-        return Err(ReadReason::Magic { format, found: head[..count].to_vec() });
+    let count = stream::fill(bytes, &mut head)?;
+    if !codec.may_begin_with(&head[..count]) {
+        let like = ImageFormat::beginning_with(&head[..count]);
+        return Err(ReadReason::Magic { format, found: head[..count].to_vec(), like });
     }
-    source.rewind().map_err(ReadReason::Io)?;
-
+    bytes.rewind().map_err(ReadReason::Io)?;
     let cancelled = Cell::new(false);
-    let source = Watched::new(source, file_bytes, watch, &cancelled);
-    let loaded = match format {
-        ImageFormat::Png | ImageFormat::Jpeg | ImageFormat::Pnm => {
-            raster::read(source, file_bytes, format).map(LoadedImage::from)
-        }
-        ImageFormat::Tiff => tiff::read(source, file_bytes).map(LoadedImage::from),
-        ImageFormat::Npy => npy::read(source, file_bytes).map(LoadedImage::from),
-        ImageFormat::Nifti => nifti::read(source, file_bytes).map(LoadedImage::from),
-        ImageFormat::NiftiGz => nifti::read_gzipped(source, file_bytes).map(LoadedImage::from),
-        ImageFormat::Dicom => dicom::read(source, file_bytes),
-        ImageFormat::MetaImage => metaimage::read(source, file_bytes, folder),
-        ImageFormat::Nrrd => nrrd::read(source, file_bytes, folder),
-        ImageFormat::Vti => vti::read(source, file_bytes),
-        ImageFormat::Segy => segy::read(source, file_bytes, &options.segy),
-        ImageFormat::Rsf => rsf::read(source, file_bytes, folder, options.segy.vertical),
-        ImageFormat::Raw => match &options.raw {
-            Some(layout) => raw::read(source, file_bytes, layout).map(LoadedImage::from),
-            None => Err(ReadReason::NoRawLayout),
-        },
-    };
+    let bytes: &mut dyn Input = bytes; // no longer than the watch
+    let bytes = Watched::new(bytes, length, watch, &cancelled);
+    let loaded = (codec.read)(Source { bytes, length, folder, options });
     if cancelled.get() { Err(Cancelled.into()) } else { loaded }
 }
 
@@ -301,46 +226,18 @@ pub fn write_image<const D: usize>(
     image: &Image<D>,
     watch: &mut dyn Watch,
 ) -> Result<(), WriteError> {
-    let mut write = || {
-        let unknown = || WriteReason::UnknownExtension { extension: extension(path) };
-        let format = ImageFormat::from_path(path).ok_or_else(unknown)?;
-        check(watch, Phase::Write, 0.0, None)?;
-        let mut file = AtomicFile::create(path)?;
-        match format {
-            ImageFormat::Png => raster::write(&mut file, image)?,
-            ImageFormat::Tiff => tiff::write(&mut file, image, watch)?,
-            ImageFormat::Npy => npy::write(&mut file, image, watch)?,
-            ImageFormat::Nifti => nifti::write(&mut file, image, watch)?,
-            ImageFormat::NiftiGz => nifti::write_gzipped(&mut file, image, watch)?,
-            ImageFormat::Nrrd => nrrd::write(&mut file, image, watch)?,
-            ImageFormat::Vti => vti::write(&mut file, image, watch)?,
-            ImageFormat::Raw => stream::write_samples(&mut file, image.samples(), format, watch)?,
-            ImageFormat::Dicom
-            | ImageFormat::Jpeg
-            | ImageFormat::MetaImage
-            | ImageFormat::Pnm
-            | ImageFormat::Segy
-            | ImageFormat::Rsf => {
-                return Err(unknown());
-            }
-        }
-        Ok(file.commit()?)
+    let written = write(path, &ImageView::of(image), watch);
+    written.map_err(|reason| WriteError { path: path.into(), reason })
+}
+
+fn write(path: &Path, image: &ImageView, watch: &mut dyn Watch) -> Result<(), WriteReason> {
+    let format = ImageFormat::from_path(path);
+    let Some(write) = format.and_then(|format| format.codec().write) else {
+        let known = ImageFormat::written_endings().collect::<Vec<_>>().join(" ");
+        return Err(WriteReason::UnknownExtension { extension: extension(path), known });
     };
-    write().map_err(|reason| WriteError { path: path.into(), reason })
-}
-
-/// A shape as people write it: `640 × 480`.
-fn shape_text(shape: &[usize]) -> String {
-    shape.iter().map(usize::to_string).collect::<Vec<_>>().join(" × ")
-}
-
-/// The product of the shape, if so many samples may be in a file of `file_bytes` bytes that packs
-/// at most `density` of them into a byte. Headers lie; room is made only for what this lets pass.
-fn plausible_count(shape: &[usize], file_bytes: u64, density: u64) -> Result<usize, ReadReason> {
-    let most = u128::from(file_bytes) * u128::from(density);
-    let count = shape.iter().try_fold(1usize, |n, &s| n.checked_mul(s));
-    match count {
-        Some(n) if n as u128 <= most => Ok(n),
-        _ => Err(ReadReason::TooLarge { shape: shape_text(shape), file_bytes }),
-    }
+    check(watch, Phase::Write, 0.0, None)?;
+    let mut file = AtomicFile::create(path)?;
+    write(&mut file, image, watch)?;
+    Ok(file.commit()?)
 }

@@ -1,8 +1,8 @@
-//! What a reader has to say about an image besides the image.
+//! What a reader reports about an image besides the image itself.
 
 use std::fmt;
 
-use super::AnyImage;
+use super::any_image::AnyImage;
 
 /// An image, and what its file says or leaves open about it.
 #[derive(Clone, Debug)]

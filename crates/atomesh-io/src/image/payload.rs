@@ -8,10 +8,13 @@ use std::path::{Path, PathBuf};
 use atomesh::image::Samples;
 use flate2::bufread::{MultiGzDecoder, ZlibDecoder};
 
+use super::error::ReadReason;
+use super::format::ImageFormat;
+use super::sample_type::{ByteOrder, SampleType};
+use super::shape::plausible_count;
 use super::stream::{self, GZIP_RATIO, Layout};
 use super::text::TextSamples;
 use super::watched::Watched;
-use super::{ByteOrder, ImageFormat, ReadReason, SampleType};
 
 /// The most files that hold one image's samples.
 const MOST_FILES: usize = 1 << 16;
@@ -44,8 +47,8 @@ pub(super) struct Payload {
     pub encoding: Encoding,
     /// Lines before the samples, in each file.
     pub line_skip: u64,
-    /// Bytes after those lines, once unpacked, in each file; none if the samples are what stands last,
-    /// whatever is before them.
+    /// Bytes after those lines, once unpacked, in each file; none if the samples are the last bytes of the
+    /// file, whatever comes before.
     pub byte_skip: Option<u64>,
     /// The files that hold the samples one after another, relative to the header's folder; none if
     /// they follow the header.
@@ -110,7 +113,7 @@ impl Payload {
             Encoding::Text => 1,
             Encoding::Gzip | Encoding::Zlib => GZIP_RATIO / size,
         };
-        let count = super::plausible_count(&self.shape, bytes, density)?;
+        let count = plausible_count(&self.shape, bytes, density)?;
         let line_skip = if self.byte_skip.is_some() { self.line_skip } else { 0 };
         let lines = skip_lines(&mut source, line_skip).map_err(ReadReason::Io)?;
         match self.encoding {
@@ -135,8 +138,8 @@ impl Payload {
         }
     }
 
-    /// Reads packed samples. Room is made as they come; nothing behind them is unpacked but what tells
-    /// whether the check sum is right.
+    /// Reads packed samples. Memory is allocated as they come. Behind them only as much is unpacked as the
+    /// check sum needs.
     fn unpack(
         &self,
         mut packed: impl Read,

@@ -1,29 +1,32 @@
 //! Raw samples: the file is the samples, and everything about them comes from the caller.
 
-use std::io::{Read, Seek, SeekFrom};
+use std::io::{Seek, SeekFrom};
 
+use atomesh::watch::Watch;
+
+use super::any_image::AnyImage;
+use super::codec::{Codec, Output, Source};
+use super::error::{ReadReason, WriteReason};
+use super::format::ImageFormat;
+use super::note::LoadedImage;
+use super::options::RawLayout;
+use super::shape::plausible_count;
 use super::stream::{self, Layout};
-use super::{AnyImage, ByteOrder, ReadReason, SampleType};
+use super::view::ImageView;
 
-/// What a raw file does not say about itself.
-#[derive(Clone, Debug, PartialEq, Eq)]
-pub struct RawLayout {
-    /// Samples along x, y (and z); x is the fastest in the file.
-    pub shape: Vec<usize>,
-    /// The type of the samples.
-    pub sample_type: SampleType,
-    /// The order of their bytes.
-    pub byte_order: ByteOrder,
-    /// The bytes before the first sample, which are skipped.
-    pub offset: u64,
-}
+const FORMAT: ImageFormat = ImageFormat::named("raw");
+
+pub(super) const CODEC: Codec = Codec {
+    endings: &[".raw"],
+    writes_floats: true,
+    write: Some(write),
+    ..Codec::reading(FORMAT, read)
+};
 
 /// Reads a raw file, whose size must be exactly what the layout says.
-pub(super) fn read<R: Read + Seek>(
-    mut source: R,
-    file_bytes: u64,
-    layout: &RawLayout,
-) -> Result<AnyImage, ReadReason> {
+fn read(source: Source) -> Result<LoadedImage, ReadReason> {
+    let Source { bytes: mut source, length: file_bytes, options, .. } = source;
+    let layout = options.raw.as_ref().ok_or(ReadReason::NoRawLayout)?;
     let RawLayout { shape, sample_type, byte_order, offset } = layout;
     if !(2..=3).contains(&shape.len()) {
         return Err(ReadReason::RawShape { shape: shape.clone() });
@@ -40,7 +43,7 @@ pub(super) fn read<R: Read + Seek>(
             offset: *offset,
         });
     }
-    let count = super::plausible_count(shape, file_bytes, 1)?;
+    let count = plausible_count(shape, file_bytes, 1)?;
     source.seek(SeekFrom::Start(*offset)).map_err(ReadReason::Io)?;
     let layout = Layout {
         sample_type: *sample_type,
@@ -50,19 +53,29 @@ pub(super) fn read<R: Read + Seek>(
         scale: None,
         turned: None,
     };
-    AnyImage::frameless(shape, stream::read_samples(&mut source, &layout)?)
+    let samples = stream::read_samples(&mut source, &layout)?;
+    Ok(AnyImage::frameless(shape, samples)?.into())
+}
+
+/// Writes the samples, the least significant byte first.
+fn write(
+    out: &mut dyn Output,
+    image: &ImageView,
+    watch: &mut dyn Watch,
+) -> Result<(), WriteReason> {
+    stream::write_samples(out, image.samples, FORMAT, watch)
 }
 
 #[cfg(test)]
 mod tests {
-    use super::super::{ImageFormat, ReadOptions, decode_image};
+    use super::super::{ByteOrder, ReadOptions, SampleType, decode_image};
     use super::*;
     use atomesh::image::Samples;
     use atomesh::watch::Silent;
 
     fn decode(bytes: &[u8], layout: RawLayout) -> Result<AnyImage, ReadReason> {
         let options = ReadOptions { raw: Some(layout), ..ReadOptions::default() };
-        decode_image(bytes, ImageFormat::Raw, &options, &mut Silent)
+        decode_image(bytes, FORMAT, &options, &mut Silent)
     }
 
     fn layout(shape: &[usize], sample_type: SampleType) -> RawLayout {

@@ -1,7 +1,7 @@
 //! Madagascar's regularly sampled format: a text of `key=value`, and samples in a file that it names.
 //!
-//! Definition: <https://reproducibility.org/wiki/Guide_to_RSF_file_format>. A later value of a key
-//! goes before an earlier one. `n1` is the fastest axis, `o1`, `d1` its origin and spacing, `label1`
+//! Definition: <https://reproducibility.org/wiki/Guide_to_RSF_file_format>. The last value of a key
+//! counts. `n1` is the fastest axis, `o1`, `d1` its origin and spacing, `label1`
 //! and `unit1` its name and unit; `in` names the file of samples, or is `stdin` where they follow the
 //! text after two form feeds and an end of transmission.
 //!
@@ -16,36 +16,39 @@ use std::path::{Path, PathBuf};
 
 use atomesh::image::{Frame, Image, Samples};
 
+use super::any_image::AnyImage;
+use super::codec::{Codec, Source};
+use super::error::ReadReason;
+use super::format::ImageFormat;
+use super::note::{LoadedImage, ReadNote};
+use super::options::Vertical;
+use super::sample_type::{ByteOrder, SampleType};
+use super::shape::plausible_count;
+use super::spelling;
 use super::stream::{self, Layout};
+use super::text::shortened;
 use super::traces::{self, Number, TraceLayout};
-use super::{
-    AnyImage, ByteOrder, ImageFormat, LoadedImage, ReadNote, ReadReason, SampleType, Vertical,
-};
 
-const FORMAT: ImageFormat = ImageFormat::Rsf;
+const FORMAT: ImageFormat = ImageFormat::named("RSF");
+
+pub(super) const CODEC: Codec =
+    Codec { endings: &[".rsf"], has_frame: true, ..Codec::reading(FORMAT, read) };
 
 /// The longest text that is read.
 const LONGEST_TEXT: u64 = 1 << 20;
 
-/// What parts the text from samples in the same file.
+/// Separates the text from samples in the same file.
 const END_OF_TEXT: &[u8] = b"\x0c\x0c\x04";
 
 /// The error for an entry of the text.
 fn wrong(field: &'static str, value: &str, expected: &'static str) -> ReadReason {
-    let value = match value.char_indices().nth(80) {
-        Some((end, _)) => format!("{} ...", &value[..end]),
-        None => value.into(),
-    };
-    ReadReason::Header { format: FORMAT, field, value, expected }
+    ReadReason::Header { format: FORMAT, field, value: shortened(value), expected }
 }
 
 /// Reads a flat image or a volume.
-pub(super) fn read<R: Read + Seek>(
-    mut source: R,
-    file_bytes: u64,
-    folder: Option<&Path>,
-    vertical: Option<Vertical>,
-) -> Result<LoadedImage, ReadReason> {
+fn read(source: Source) -> Result<LoadedImage, ReadReason> {
+    let vertical = source.options.segy.vertical;
+    let Source { bytes: mut source, length: file_bytes, folder, .. } = source;
     let mut text = vec![0; file_bytes.min(LONGEST_TEXT) as usize];
     let filled = stream::fill(&mut source, &mut text)?;
     text.truncate(filled);
@@ -166,13 +169,13 @@ impl Header {
         let shape: Vec<usize> = self.axes.iter().map(|axis| axis.count).collect();
         let Encoding::Binary(sample_type, byte_order) = self.encoding else {
             // a number takes two bytes at least, a digit and a space
-            let count = super::plausible_count(&shape, bytes.saturating_add(1) / 2, 1)?;
+            let count = plausible_count(&shape, bytes.saturating_add(1) / 2, 1)?;
             let numbers = text_numbers(source, count)?;
             let encoding = Encoding::Binary(SampleType::F32, ByteOrder::Little);
             let binary = Self { encoding, data: String::new(), axes: self.axes.clone(), ..*self };
             return binary.samples(&mut &numbers[..], numbers.len() as u64);
         };
-        let count = super::plausible_count(&shape, bytes, 1 << 10)?;
+        let count = plausible_count(&shape, bytes, 1 << 10)?;
         let found = bytes / sample_type.size() as u64;
         if count as u64 > found {
             return Err(ReadReason::Truncated { expected: count as u64, found });
@@ -269,14 +272,7 @@ fn encoding(name: &str, element_bytes: Option<&str>) -> Result<Encoding, ReadRea
         expected: "native_, xdr_ or ascii_ float, double, int, short or uchar",
     };
     let (order, kind) = name.split_once('_').ok_or_else(unknown)?;
-    let sample_type = match kind {
-        "float" => SampleType::F32,
-        "double" => SampleType::F64,
-        "int" => SampleType::I32,
-        "short" => SampleType::I16,
-        "uchar" | "byte" => SampleType::U8,
-        _ => return Err(unknown()),
-    };
+    let sample_type = spelling::named(kind, |own| own.rsf).ok_or_else(unknown)?;
     let size = sample_type.size().to_string();
     match (order, element_bytes) {
         ("ascii", _) => Ok(Encoding::Text),

@@ -1,15 +1,16 @@
 //! Numbers in a file to samples in memory and back, a block at a time.
 //!
-//! Only one vector is ever as large as the image: bytes pass through a buffer of a block. A vector
-//! grows no further ahead of the bytes that have come than its caller says it may, so that a lying
-//! header costs nothing.
+//! Only one vector is ever as large as the image: bytes pass through a buffer of a block. Beyond what its
+//! caller allows, a vector grows only as bytes come, so that a false header costs no memory.
 
 use std::io::{self, Read, Write};
 
 use atomesh::image::Samples;
 use atomesh::watch::{Phase, Watch, check};
 
-use super::{ByteOrder, ReadReason, SampleType, WriteReason};
+use super::error::{ReadReason, WriteReason};
+use super::format::ImageFormat;
+use super::sample_type::{ByteOrder, SampleType};
 
 /// The most bytes that a byte of gzip or zlib can stand for.
 pub(super) const GZIP_RATIO: u64 = 1032;
@@ -25,7 +26,7 @@ pub(super) struct Layout {
     pub byte_order: ByteOrder,
     /// How many samples there are.
     pub count: usize,
-    /// How many samples to make room for before the first one has come.
+    /// The samples for which memory is allocated at once, before the first one has come.
     pub reserve: usize,
     /// Slope s and intercept t if a sample is s · value + t, in single precision.
     pub scale: Option<(f64, f64)>,
@@ -106,8 +107,7 @@ fn collect<const N: usize, T: Copy + Default>(
     Ok(samples)
 }
 
-/// Makes room for `wanted` more samples: for twice as many as there are, but no more than
-/// `count` in all unless so many come.
+/// Reserves memory for `wanted` more samples: twice what is reserved, but at most `count` in all.
 pub(super) fn grow<T>(samples: &mut Vec<T>, wanted: usize, count: usize) -> Result<(), ReadReason> {
     if samples.capacity() - samples.len() >= wanted {
         return Ok(());
@@ -115,7 +115,7 @@ pub(super) fn grow<T>(samples: &mut Vec<T>, wanted: usize, count: usize) -> Resu
     reserve(samples, (2 * samples.capacity()).min(count).max(samples.len() + wanted))
 }
 
-/// Makes room for `count` samples in all.
+/// Reserves memory for `count` samples in all.
 fn reserve<T>(samples: &mut Vec<T>, count: usize) -> Result<(), ReadReason> {
     samples
         .try_reserve_exact(count - samples.len())
@@ -168,7 +168,7 @@ fn half_to_single(bits: u16) -> f32 {
 pub(super) fn write_samples(
     out: &mut dyn Write,
     samples: &Samples,
-    format: super::ImageFormat,
+    format: ImageFormat,
     watch: &mut dyn Watch,
 ) -> Result<(), WriteReason> {
     /// Writes with one function for each type.

@@ -1,9 +1,10 @@
-//! What headers in text share: lines, lists of numbers, and samples that are text themselves.
+//! What headers in text share: lines, lists of numbers, and samples as text.
 
 use std::io::{self, BufRead, Read};
 use std::str::FromStr;
 
-use super::{ReadReason, SampleType};
+use super::error::ReadReason;
+use super::sample_type::SampleType;
 
 /// The longest header that is read, detached names included.
 const LONGEST_HEADER: usize = 1 << 22;

@@ -9,24 +9,40 @@ use ::tiff::encoder::colortype::{
 use ::tiff::encoder::{TiffEncoder, TiffKind, TiffKindBig, TiffKindStandard, TiffValue};
 use ::tiff::tags::SampleFormat;
 use ::tiff::{ColorType, TiffError};
-use atomesh::image::{Image, Samples};
+use atomesh::image::Samples;
 use atomesh::watch::{Phase, Watch, check};
 
-use super::raster::{first_of, luminance};
+use super::any_image::AnyImage;
+use super::codec::{Begins, Codec, Output, Source};
+use super::colour::{first_of, grey, in_place};
+use super::error::{ReadReason, WriteReason};
+use super::format::ImageFormat;
+use super::note::LoadedImage;
+use super::shape::{plausible_count, shape_text};
 use super::stream;
-use super::{AnyImage, ImageFormat, ReadReason, WriteReason, shape_text};
+use super::view::ImageView;
 
-const FORMAT: ImageFormat = ImageFormat::Tiff;
+const FORMAT: ImageFormat = ImageFormat::named("TIFF");
+
+pub(super) const CODEC: Codec = Codec {
+    endings: &[".tif", ".tiff"],
+    begins: Begins::With(&[b"II\x2a\0", b"II\x2b\0", b"MM\0\x2a", b"MM\0\x2b"]),
+    writes_floats: true,
+    write: Some(write),
+    ..Codec::reading(FORMAT, read)
+};
 
 /// Samples that a byte of the file may stand for: a constant image packs about 1400 into one byte
 /// by LZW and 1032 by deflate.
 const DENSITY: u64 = 4096;
 
 /// Reads all pages. They are compared before the first one is decoded.
-pub(super) fn read<R: Read + Seek>(source: R, file_bytes: u64) -> Result<AnyImage, ReadReason> {
-    let mut decoder = Decoder::new(BufReader::with_capacity(1 << 16, source)).map_err(reason)?;
+fn read(source: Source) -> Result<LoadedImage, ReadReason> {
+    let file_bytes = source.length;
+    let bytes = BufReader::with_capacity(1 << 16, source.bytes);
+    let mut decoder = Decoder::new(bytes).map_err(reason)?;
     let first = Page::of(&mut decoder)?;
-    super::plausible_count(&[first.width, first.height], file_bytes, DENSITY)?;
+    plausible_count(&[first.width, first.height], file_bytes, DENSITY)?;
     let mut page_count = 1;
     while decoder.more_images() {
         decoder.next_image().map_err(reason)?;
@@ -44,7 +60,7 @@ pub(super) fn read<R: Read + Seek>(source: R, file_bytes: u64) -> Result<AnyImag
         1 => vec![first.width, first.height],
         _ => vec![first.width, first.height, page_count],
     };
-    let count = super::plausible_count(&shape, file_bytes, DENSITY)?;
+    let count = plausible_count(&shape, file_bytes, DENSITY)?;
 
     let mut limits = Limits::default();
     limits.decoding_buffer_size = count.saturating_mul(4 * 8);
@@ -60,7 +76,7 @@ pub(super) fn read<R: Read + Seek>(source: R, file_bytes: u64) -> Result<AnyImag
         append(&mut volume, plane, count)?;
     }
     match volume {
-        Some(samples) => AnyImage::frameless(&shape, samples),
+        Some(samples) => Ok(AnyImage::frameless(&shape, samples)?.into()),
         None => Err(ReadReason::Truncated { expected: count as u64, found: 0 }),
     }
 }
@@ -117,64 +133,62 @@ impl Page {
 
 /// The samples of a decoded page, colour to luminance.
 fn samples(decoded: DecodingResult, color: ColorType) -> Result<Samples, ReadReason> {
-    /// Keeps grey samples, makes others grey by the given function.
-    macro_rules! grey {
-        ($v:expr, $luminance:ident) => {
-            match color {
-                ColorType::GrayA(_) => first_of::<2, _>($v),
-                ColorType::RGB(_) => $luminance::<3, _>($v),
-                ColorType::RGBA(_) => $luminance::<4, _>($v),
-                _ => $v,
-            }
-        };
-    }
-    /// As `grey`, but colour is not supported.
-    macro_rules! only_grey {
-        ($v:expr) => {
-            match color {
-                ColorType::Gray(_) => $v,
-                ColorType::GrayA(_) => first_of::<2, _>($v),
-                _ => {
-                    return Err(ReadReason::Unsupported {
-                        format: FORMAT,
-                        found: "colour in signed integers or integers of 64 bits".into(),
-                        expected: "colour in unsigned integers of 8 to 32 bits and in floats",
-                    });
-                }
-            }
-        };
-    }
+    let channels = match color {
+        ColorType::GrayA(_) => 2,
+        ColorType::RGB(_) => 3,
+        ColorType::RGBA(_) => 4,
+        _ => 1,
+    };
     Ok(match decoded {
-        DecodingResult::U8(v) => Samples::U8(grey!(v, luminance)),
-        DecodingResult::U16(v) => Samples::U16(grey!(v, luminance)),
-        DecodingResult::U32(v) => Samples::U32(grey!(v, luminance)),
-        DecodingResult::F32(v) => Samples::F32(grey!(v, float_luminance)),
-        DecodingResult::F64(v) => Samples::F64(grey!(v, float_luminance)),
+        DecodingResult::U8(v) => Samples::U8(grey(v, channels)),
+        DecodingResult::U16(v) => Samples::U16(grey(v, channels)),
+        DecodingResult::U32(v) => Samples::U32(grey(v, channels)),
+        DecodingResult::F32(v) => Samples::F32(grey_floats(v, channels)),
+        DecodingResult::F64(v) => Samples::F64(grey_floats(v, channels)),
         DecodingResult::F16(v) => {
             let single = v.iter().map(|h| h.to_f32()).collect::<Vec<f32>>();
-            Samples::F32(grey!(single, float_luminance))
+            Samples::F32(grey_floats(single, channels))
         }
-        DecodingResult::I8(v) => Samples::I8(only_grey!(v)),
-        DecodingResult::I16(v) => Samples::I16(only_grey!(v)),
-        DecodingResult::I32(v) => Samples::I32(only_grey!(v)),
-        DecodingResult::U64(v) => Samples::F64(only_grey!(v).iter().map(|&n| n as f64).collect()),
-        DecodingResult::I64(v) => Samples::F64(only_grey!(v).iter().map(|&n| n as f64).collect()),
+        DecodingResult::I8(v) => Samples::I8(without_colour(v, channels)?),
+        DecodingResult::I16(v) => Samples::I16(without_colour(v, channels)?),
+        DecodingResult::I32(v) => Samples::I32(without_colour(v, channels)?),
+        DecodingResult::U64(v) => {
+            Samples::F64(without_colour(v, channels)?.iter().map(|&n| n as f64).collect())
+        }
+        DecodingResult::I64(v) => {
+            Samples::F64(without_colour(v, channels)?.iter().map(|&n| n as f64).collect())
+        }
     })
 }
 
-/// Rec. 601 luminance of interleaved floats, in place.
-fn float_luminance<const N: usize, T>(mut interleaved: Vec<T>) -> Vec<T>
+/// Grey samples without their opacity; colour is refused.
+fn without_colour<T: Copy>(interleaved: Vec<T>, channels: usize) -> Result<Vec<T>, ReadReason> {
+    match channels {
+        1 => Ok(interleaved),
+        2 => Ok(first_of::<2, T>(interleaved)),
+        _ => Err(ReadReason::Unsupported {
+            format: FORMAT,
+            found: "colour in signed integers or integers of 64 bits".into(),
+            expected: "colour in unsigned integers of 8 to 32 bits and in floats",
+        }),
+    }
+}
+
+/// Floats without their opacity, colour to Rec. 601 luminance.
+fn grey_floats<T>(interleaved: Vec<T>, channels: usize) -> Vec<T>
 where
     T: Copy + Into<f64> + FromDouble,
 {
-    let count = interleaved.len() / N;
-    for k in 0..count {
-        let [r, g, b] = [0, 1, 2].map(|c| interleaved[k * N + c].into());
-        interleaved[k] = T::from_double(0.299 * r + 0.587 * g + 0.114 * b);
+    let luminance = |sample: &[T]| {
+        let [r, g, b] = [0, 1, 2].map(|c| sample[c].into());
+        T::from_double(0.299 * r + 0.587 * g + 0.114 * b)
+    };
+    match channels {
+        2 => first_of::<2, T>(interleaved),
+        3 => in_place::<3, T>(interleaved, luminance),
+        4 => in_place::<4, T>(interleaved, luminance),
+        _ => interleaved,
     }
-    interleaved.truncate(count);
-    interleaved.shrink_to_fit();
-    interleaved
 }
 
 /// A float that a double can be rounded to.
@@ -213,36 +227,36 @@ fn append(volume: &mut Option<Samples>, plane: Samples, count: usize) -> Result<
 }
 
 /// Writes a page for each z, not compressed; BigTIFF where 32-bit offsets would not reach.
-pub(super) fn write<const D: usize, W: Write + Seek>(
-    out: W,
-    image: &Image<D>,
+fn write(
+    out: &mut dyn Output,
+    image: &ImageView,
     watch: &mut dyn Watch,
 ) -> Result<(), WriteReason> {
-    let samples = image.samples();
+    let samples = image.samples;
     if samples.len() as u64 * samples.sample_size() as u64 > 4_000_000_000 {
-        write_pages(TiffEncoder::<W, TiffKindBig>::new_generic(out).map_err(failure)?, image, watch)
+        let encoder = TiffEncoder::<_, TiffKindBig>::new_generic(out).map_err(failure)?;
+        write_pages(encoder, image, watch)
     } else {
-        let encoder = TiffEncoder::<W, TiffKindStandard>::new_generic(out).map_err(failure)?;
+        let encoder = TiffEncoder::<_, TiffKindStandard>::new_generic(out).map_err(failure)?;
         write_pages(encoder, image, watch)
     }
 }
 
 /// Writes the pages with one function for each type.
-fn write_pages<const D: usize, W: Write + Seek, K: TiffKind>(
+fn write_pages<W: Write + Seek, K: TiffKind>(
     mut encoder: TiffEncoder<W, K>,
-    image: &Image<D>,
+    image: &ImageView,
     watch: &mut dyn Watch,
 ) -> Result<(), WriteReason> {
-    let shape = image.frame().shape();
     let side = |n: usize| {
         u32::try_from(n).map_err(|_| WriteReason::Shape {
             format: FORMAT,
-            shape: shape.to_vec(),
+            shape: image.shape.clone(),
             expected: "up to 2^32 samples across; write .npy instead",
         })
     };
-    let size = (side(shape[0])?, side(shape[1])?);
-    match image.samples() {
+    let size = [side(image.shape[0])?, side(image.shape[1])?];
+    match image.samples {
         Samples::U8(v) => write_planes::<Gray8, _, _>(&mut encoder, v, size, watch),
         Samples::I8(v) => write_planes::<GrayI8, _, _>(&mut encoder, v, size, watch),
         Samples::U16(v) => write_planes::<Gray16, _, _>(&mut encoder, v, size, watch),
@@ -259,16 +273,17 @@ fn write_pages<const D: usize, W: Write + Seek, K: TiffKind>(
     }
 }
 
-/// Writes planes of `width` × `height` samples, strip by strip.
+/// Writes planes of so many samples along x and y, strip by strip.
 fn write_planes<C: Encoded, W: Write + Seek, K: TiffKind>(
     encoder: &mut TiffEncoder<W, K>,
     samples: &[C::Inner],
-    (width, height): (u32, u32),
+    size: [u32; 2],
     watch: &mut dyn Watch,
 ) -> Result<(), WriteReason>
 where
     [C::Inner]: TiffValue,
 {
+    let [width, height] = size;
     let mut left = samples;
     for plane in samples.chunks_exact(width as usize * height as usize) {
         let mut page = encoder.new_image::<C>(width, height).map_err(failure)?;
@@ -298,7 +313,7 @@ mod tests {
     use super::super::{ReadOptions, decode_image};
     use super::*;
     use ::tiff::encoder::colortype::{Gray64, RGB8, RGB32Float};
-    use atomesh::image::Frame;
+    use atomesh::image::{Frame, Image};
     use atomesh::watch::Silent;
     use std::io::Cursor;
 
@@ -309,7 +324,7 @@ mod tests {
     fn encode<const D: usize>(shape: [usize; D], samples: Samples) -> Vec<u8> {
         let image = Image::new(Frame::new(shape).unwrap(), samples).unwrap();
         let mut bytes = Cursor::new(Vec::new());
-        write(&mut bytes, &image, &mut Silent).unwrap();
+        write(&mut bytes, &ImageView::of(&image), &mut Silent).unwrap();
         bytes.into_inner()
     }
 

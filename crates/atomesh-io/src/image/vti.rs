@@ -8,16 +8,22 @@
 //!
 //! Written is one array of points, `image`, appended as zlib blocks, as in VTU files.
 
-use std::io::{Read, Seek, Write};
+use std::io::Read;
 
-use atomesh::image::{Image, Samples};
+use atomesh::image::Samples;
 use atomesh::watch::Watch;
 
 use super::affine::{self, Affine};
+use super::codec::{Begins, Codec, Output, Source};
+use super::error::{ReadReason, WriteReason};
+use super::format::ImageFormat;
+use super::note::{LoadedImage, ReadNote};
+use super::sample_type::ByteOrder;
+use super::shape::plausible_count;
+use super::spelling::{self, Spelling};
 use super::stream::{self, GZIP_RATIO, Layout};
 use super::text::{TextSamples, numbers, shortened};
-use super::watched::Watched;
-use super::{ByteOrder, ImageFormat, LoadedImage, ReadNote, ReadReason, SampleType, WriteReason};
+use super::view::ImageView;
 use crate::mesh::MeshWriteError;
 use crate::mesh::column::{Column, Endian};
 use crate::mesh::vtu::appended::Head;
@@ -25,7 +31,21 @@ use crate::mesh::vtu::array::{Array, Place};
 use crate::mesh::vtu::read::{Document, Piece};
 use crate::mesh::vtu::xml::Tag;
 
-const FORMAT: ImageFormat = ImageFormat::Vti;
+const FORMAT: ImageFormat = ImageFormat::named("VTI");
+
+pub(super) const CODEC: Codec = Codec {
+    endings: &[".vti"],
+    begins: Begins::If(|head| {
+        // an XML declaration may come first, and a byte order mark before that
+        let head = head.strip_prefix(b"\xef\xbb\xbf").unwrap_or(head).trim_ascii_start();
+        head.is_empty() || head.starts_with(b"<")
+    }),
+    has_frame: true,
+    z_is_height: true,
+    writes_floats: true,
+    write: Some(write),
+    ..Codec::reading(FORMAT, read)
+};
 
 /// VTK's name of this kind of file.
 const KIND: &str = "ImageData";
@@ -39,10 +59,8 @@ fn unsupported(found: String, expected: &'static str) -> ReadReason {
 }
 
 /// Reads a `.vti` file, which is held whole meanwhile.
-pub(super) fn read<R: Read>(
-    mut source: Watched<R>,
-    file_bytes: u64,
-) -> Result<LoadedImage, ReadReason> {
+fn read(source: Source) -> Result<LoadedImage, ReadReason> {
+    let Source { bytes: mut source, length: file_bytes, .. } = source;
     let mut bytes = Vec::new();
     let room = usize::try_from(file_bytes).unwrap_or(usize::MAX);
     let memory = |_| ReadReason::Memory { bytes: file_bytes.into() };
@@ -126,26 +144,16 @@ fn scalars<'a, 'b>(piece: &'b Piece<'a>) -> Result<(&'b Array<'a>, bool), ReadRe
 
 /// The samples of an array.
 fn samples(array: &Array, shape: &[usize; 3], file_bytes: u64) -> Result<Samples, ReadReason> {
-    let sample_type = match array.kind {
-        "Int8" => SampleType::I8,
-        "UInt8" => SampleType::U8,
-        "Int16" => SampleType::I16,
-        "UInt16" => SampleType::U16,
-        "Int32" => SampleType::I32,
-        "UInt32" => SampleType::U32,
-        "Int64" => SampleType::I64,
-        "UInt64" => SampleType::U64,
-        "Float32" => SampleType::F32,
-        "Float64" => SampleType::F64,
-        other => return Err(unsupported(format!("samples of type {other}"), "Int8 ... Float64")),
-    };
-    let count = super::plausible_count(shape, file_bytes, GZIP_RATIO)?;
+    let sample_type = spelling::named(array.kind, |own| own.vtk).ok_or_else(|| {
+        unsupported(format!("samples of type {}", array.kind), "Int8 ... Float64")
+    })?;
+    let count = plausible_count(shape, file_bytes, GZIP_RATIO)?;
     let is_big = array.layout.endian == Endian::Big && !matches!(array.place, Place::Text(_));
     let byte_order = if is_big { ByteOrder::Big } else { ByteOrder::Little };
     let layout =
         Layout { sample_type, byte_order, count, reserve: count, scale: None, turned: None };
     if let Place::Text(at) = array.place {
-        let count = super::plausible_count(shape, file_bytes, 1)?;
+        let count = plausible_count(shape, file_bytes, 1)?;
         let mut words = TextSamples::new(array.text(at).as_bytes(), sample_type);
         return stream::read_samples(&mut words, &Layout { count, ..layout });
     }
@@ -155,55 +163,52 @@ fn samples(array: &Array, shape: &[usize; 3], file_bytes: u64) -> Result<Samples
 }
 
 /// Writes a `.vti` file; numbers have all their digits, so that the frame is kept exactly.
-pub(super) fn write<const D: usize>(
-    out: &mut (impl Write + Seek),
-    image: &Image<D>,
+fn write(
+    mut out: &mut dyn Output,
+    image: &ImageView,
     watch: &mut dyn Watch,
 ) -> Result<(), WriteReason> {
-    let frame = image.frame();
     let listed = |numbers: &[f64]| numbers.iter().map(f64::to_string).collect::<Vec<_>>().join(" ");
-    let (mut origin, mut spacing) = ([0.0; 3], [1.0; 3]);
-    let mut direction = Affine::scaling([1.0; 3]).matrix;
-    origin[..D].copy_from_slice(&frame.origin());
-    spacing[..D].copy_from_slice(&frame.spacing());
-    for (row, of_frame) in direction.iter_mut().zip(frame.direction()) {
-        row[..D].copy_from_slice(&of_frame);
-    }
-    let last = |axis: usize| frame.shape().get(axis).map_or(0, |n| n - 1);
+    let last = |axis: usize| image.shape.get(axis).map_or(0, |n| n - 1);
     let extent = format!("0 {} 0 {} 0 {}", last(0), last(1), last(2));
     let mut head = Head::with_attributes(
         KIND,
         &format!(
             "WholeExtent=\"{extent}\" Origin=\"{}\" Spacing=\"{}\" Direction=\"{}\"",
-            listed(&origin),
-            listed(&spacing),
-            listed(direction.as_flattened())
+            listed(&image.origin),
+            listed(&image.spacing),
+            listed(image.direction.as_flattened())
         ),
     );
     head.text(&format!("<Piece Extent=\"{extent}\">\n<PointData Scalars=\"image\">\n"));
-    /// Names the array with one function for each type.
-    macro_rules! name_as {
-        ($($kind:ident $name:literal),*) => {
-            match image.samples() {
-                $(Samples::$kind(v) => {
-                    head.array($name, "image", "", Column::slice(v, Endian::Little));
-                })*
-                other => {
-                    return Err(WriteReason::SampleType {
-                        format: FORMAT,
-                        sample_type: other.type_name(),
-                        expected: "integers up to 32 bits, float32 and float64",
-                    });
-                }
-            }
-        };
-    }
-    name_as!(U8 "UInt8", I8 "Int8", U16 "UInt16", I16 "Int16", U32 "UInt32", I32 "Int32",
-        F32 "Float32", F64 "Float64");
+    let name = Spelling::of_samples(image.samples).and_then(|own| own.vtk.first());
+    let column = column(image.samples);
+    let (Some(name), Some(column)) = (name, column) else {
+        return Err(WriteReason::SampleType {
+            format: FORMAT,
+            sample_type: image.samples.type_name(),
+            expected: "integers up to 32 bits, float32 and float64",
+        });
+    };
+    head.array(name, "image", "", column);
     head.text("</PointData>\n</Piece>\n");
-    head.write(out, watch).map_err(|e| match e {
+    head.write(&mut out, watch).map_err(|e| match e {
         MeshWriteError::Io(e) => WriteReason::Io(e),
         MeshWriteError::Cancelled(e) => WriteReason::Cancelled(e),
         other => WriteReason::Encoder { format: FORMAT, error: other.into() },
     })
+}
+
+/// The samples as an array of the file; none for a type that is not known here.
+fn column(samples: &Samples) -> Option<Column<'_>> {
+    /// Makes the array with one function for each type.
+    macro_rules! column_of {
+        ($($kind:ident),*) => {
+            match samples {
+                $(Samples::$kind(v) => Some(Column::slice(v, Endian::Little)),)*
+                _ => None,
+            }
+        };
+    }
+    column_of!(U8, I8, U16, I16, U32, I32, F32, F64)
 }

@@ -1,12 +1,12 @@
-//! A reader that shows how far it is, and that a watch can stop.
+//! A reader that reports its progress to a watch, which can stop it.
 
 use std::cell::Cell;
 use std::io::{self, Read, Seek, SeekFrom};
 
 use atomesh::watch::{Cancelled, Phase, Watch, check};
 
-/// Bytes between two looks at the watch. Gzip unpacks at most a thousand times as many, so that
-/// even then a look comes every second.
+/// Bytes between two looks at the watch. Gzip unpacks at most a thousand times as many, so that the watch
+/// is asked every second even then.
 const STEP: u64 = 1 << 19;
 
 /// Passes bytes on and tells the watch, every half megabyte, the share of the file that was read.

@@ -1,6 +1,6 @@
 //! What is known of each cell: numbers and vectors.
 
-use super::data::{Field, MeshDataError, Values, check_field};
+use super::field::{Field, MeshDataError, Values, check_field};
 
 /// A named vector for each cell.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -67,7 +67,7 @@ impl<'a, const D: usize> CellFields<'a, D> {
     fn check(&self, name: &str, found: usize) -> Result<(), MeshDataError> {
         let numbers = self.numbers.iter().map(Field::name);
         let others = numbers.chain(self.vectors.iter().map(VectorField::name));
-        check_field(others, name, [found, self.cell_count])
+        check_field(others, name, found, self.cell_count)
     }
 
     /// The numbers.

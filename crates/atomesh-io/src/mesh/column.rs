@@ -1,9 +1,9 @@
-//! Arrays of a mesh file, made piece by piece, so that no second copy of a mesh is ever held.
+//! Arrays of a mesh file, made piece by piece, so that the mesh is never copied whole.
 
 use std::io::{self, Write};
 use std::ops::Range;
 
-use super::data::Values;
+use super::field::Values;
 
 /// The order of the bytes in a number.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -60,7 +60,7 @@ macro_rules! number {
 }
 number!(i8, u8, i16, u16, i32, u32, i64, u64, f32, f64);
 
-/// An array of equal items that can be made from any index on.
+/// An array of items of one size, of which any range can be made by itself.
 pub(crate) struct Column<'a> {
     count: usize,
     item_size: usize,

@@ -1,4 +1,4 @@
-//! What flows through each facet, as a table in CSV with a head in JSON.
+//! The flux through each facet, as a CSV table with a JSON header.
 
 use std::fmt::Write as _;
 use std::io::{self, Write};
@@ -9,8 +9,9 @@ use atomesh::watch::{Phase, Watch, check};
 use serde_json::json;
 
 use super::cells::connections::{put, vector};
-use super::data::Provenance;
-use super::{MeshWriteError, metadata};
+use super::error::MeshWriteError;
+use super::metadata;
+use super::provenance::Provenance;
 use crate::atomic_file::AtomicFile;
 
 /// Facets between two looks at the watch.
@@ -118,7 +119,7 @@ fn quoted(name: &str) -> String {
 
 fn head_text<const D: usize>(files: &FluxFiles, table: &FluxTable<D>) -> String {
     let name = files.facets.file_name().unwrap_or_default().to_string_lossy();
-    let metadata = metadata::encode_parts(table.frame, table.provenance);
+    let metadata = metadata::encode(table.frame, table.provenance);
     let metadata: serde_json::Value = serde_json::from_str(&metadata).unwrap_or_default();
     let area = if D == 2 { "length" } else { "area" };
     let text = json!({

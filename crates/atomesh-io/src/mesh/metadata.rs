@@ -3,22 +3,18 @@
 use atomesh::image::Frame;
 use serde_json::{Value, json};
 
-use super::data::{MeshData, Provenance};
+use super::provenance::Provenance;
 
 /// The name under which formats that name their arrays keep the text.
 pub(super) const NAME: &str = "atomesh";
 
-/// The text for a mesh; the same for the same data.
-pub(super) fn encode<const D: usize>(data: &MeshData<D>) -> String {
-    encode_parts(data.frame(), data.provenance())
-}
-
-/// The same with the numbers by which a format that has numbers above 0 alone knows other regions.
+/// The text with the numbers by which a format that has numbers above 0 alone knows other regions.
 pub(super) fn encode_with_regions<const D: usize>(
-    data: &MeshData<D>,
+    frame: Option<&Frame<D>>,
+    provenance: Option<&Provenance>,
     known_as: &[(i32, i32)],
 ) -> String {
-    let mut object = object(data.frame(), data.provenance());
+    let mut object = object(frame, provenance);
     if !known_as.is_empty() {
         object.insert("regions".into(), json!(known_as));
     }
@@ -26,7 +22,7 @@ pub(super) fn encode_with_regions<const D: usize>(
 }
 
 /// The text for a frame and a provenance, as far as they are known.
-pub(super) fn encode_parts<const D: usize>(
+pub(super) fn encode<const D: usize>(
     frame: Option<&Frame<D>>,
     provenance: Option<&Provenance>,
 ) -> String {
@@ -57,7 +53,7 @@ fn object<const D: usize>(
     object
 }
 
-/// What a file's text says; nothing where it does not say it as [`encode`] does.
+/// What a file's text says, as far as it has the form that [`encode`] gives it.
 #[derive(Clone, Debug, Default)]
 pub(super) struct Metadata(Value);
 

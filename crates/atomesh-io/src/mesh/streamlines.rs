@@ -10,9 +10,11 @@ use atomesh::image::Frame;
 use atomesh::watch::Watch;
 
 use super::column::{Column, Endian};
-use super::data::{MeshDataError, Provenance};
+use super::error::MeshWriteError;
+use super::field::MeshDataError;
+use super::metadata;
+use super::provenance::Provenance;
 use super::vtu::appended::Head;
-use super::{MeshWriteError, metadata};
 use crate::atomic_file::AtomicFile;
 
 /// A line along which something flows.
@@ -86,7 +88,7 @@ pub fn write_streamlines<const D: usize>(
         let end = i32::try_from(count);
         ends.push(end.map_err(|_| MeshWriteError::TooMany { format: "VTP", count, limit })?);
     }
-    let text = metadata::encode_parts(data.frame, data.provenance);
+    let text = metadata::encode(data.frame, data.provenance);
     let points: Vec<[f64; D]> = lines.iter().flat_map(|line| line.points).copied().collect();
     let of_points = |values: for<'l> fn(&Streamline<'l, D>) -> &'l [f64]| -> Vec<f64> {
         lines.iter().flat_map(values).copied().collect()

@@ -4,7 +4,7 @@ use std::collections::{BTreeMap, HashMap, HashSet};
 
 use atomesh::mesh::{FacetGroup, Mesh, Regions, Tags};
 
-use super::read::MeshReadError;
+use super::read_error::MeshReadError;
 
 /// The name of the one region that formats need where a mesh has facet groups but no regions.
 pub(super) const DOMAIN: &str = "domain";
@@ -41,7 +41,7 @@ pub(super) fn ascending<const D: usize>(facet: &[u32; D]) -> [u32; D] {
     sorted
 }
 
-/// A name as formats of narrow rules take it: letters, digits, `_` and `-`.
+/// A name for formats that take letters, digits, `_` and `-` only.
 pub(super) fn plain_name(name: &str) -> String {
     name.replace('.', "_")
 }
@@ -49,7 +49,7 @@ pub(super) fn plain_name(name: &str) -> String {
 /// Tags as a file has them, before the dimension is known.
 #[derive(Debug, Default)]
 pub(super) struct RawTags {
-    /// Lines, each with the number of a group; one of several groups comes several times.
+    /// Lines, each with the number of a group; a line of several groups is listed once for each.
     pub edges: Vec<([u32; 2], i32)>,
     /// Triangles likewise.
     pub triangles: Vec<([u32; 3], i32)>,
@@ -66,8 +66,8 @@ pub(super) struct RawTags {
 }
 
 impl RawTags {
-    /// The tags of a mesh of edges and triangles, or of triangles and tetrahedra, and how many facets were
-    /// left out since they are none of the mesh, or come twice.
+    /// The tags of a mesh of edges and triangles, or of triangles and tetrahedra; and the number of facets left
+    /// out because they are not the mesh's, or are listed twice.
     pub fn into_tags<const D: usize>(
         self,
         mesh: &Mesh<D>,

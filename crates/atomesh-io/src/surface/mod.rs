@@ -7,9 +7,11 @@
 //! mesh's, in double precision, but single in STL.
 
 mod gocad;
+mod loaded;
 mod obj;
 mod ply;
 mod read;
+mod read_vtp;
 mod stl;
 mod vtp;
 
@@ -20,7 +22,8 @@ use std::path::{Path, PathBuf};
 use atomesh::mesh::{FacetGroup, Mesh};
 use atomesh::watch::{Cancelled, Phase, Watch, check};
 
-pub use read::{LoadedSurface, SurfaceReadError, read_surface};
+pub use loaded::LoadedSurface;
+pub use read::{SurfaceReadError, read_surface};
 
 use crate::atomic_file::AtomicFile;
 use crate::mesh::MeshWriteError;

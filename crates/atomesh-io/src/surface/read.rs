@@ -1,26 +1,13 @@
-//! Reading surface files: what is written here, STL as text too, and the common of what others write.
+//! Reading surface files: those written here, STL as text too, and the common parts of what others write.
 
 use std::io;
 use std::path::Path;
 use std::str::FromStr;
 
+use super::loaded::LoadedSurface;
+use super::read_vtp::read_vtp;
 use super::{SurfaceFormat, SurfaceWriteError};
 use crate::mesh::MeshReadError;
-use crate::mesh::vtu::poly::read_poly;
-
-/// Points with the lines or triangles between them, and the name of the group of each.
-#[derive(Clone, Debug, Default, PartialEq)]
-pub struct LoadedSurface {
-    /// The points; in STL three for each triangle.
-    pub points: Vec<[f64; 3]>,
-    /// The lines.
-    pub lines: Vec<[u32; 2]>,
-    /// The triangles.
-    pub triangles: Vec<[u32; 3]>,
-    /// The group of each line or triangle, by its name, or its number where the file has no names; of none,
-    /// empty.
-    pub groups: Vec<String>,
-}
 
 /// Why a surface was not read.
 #[derive(Debug, thiserror::Error)]
@@ -49,8 +36,8 @@ fn malformed(expected: &'static str, found: impl Into<String>) -> SurfaceReadErr
     SurfaceReadError::Malformed { expected, found: found.into() }
 }
 
-/// Reads a surface in the format that the name calls for: VTP (one piece of lines and triangles), STL (binary or text), OBJ (lines and triangles), PLY
-/// as it is written here, GOCAD's TSurf and PLine.
+/// Reads a surface in the format that the name calls for: VTP (one piece of lines and triangles), STL (binary
+/// or text), OBJ (lines and triangles), PLY as it is written here, GOCAD's TSurf and PLine.
 ///
 /// # Errors
 /// [`SurfaceReadError`] if the file cannot be read or is not what its name says.
@@ -66,7 +53,7 @@ pub fn read_surface(path: &Path) -> Result<LoadedSurface, SurfaceReadError> {
         SurfaceFormat::Obj => obj(&text(&bytes)?),
         SurfaceFormat::Ply => ply(&bytes),
         SurfaceFormat::TSurf | SurfaceFormat::PLine => gocad(&text(&bytes)?),
-        SurfaceFormat::Vtp => Ok(read_poly(&bytes)?),
+        SurfaceFormat::Vtp => Ok(read_vtp(&bytes)?),
     }?;
     let count = surface.points.len();
     let corners = surface.lines.as_flattened().iter().chain(surface.triangles.as_flattened());

@@ -10,11 +10,11 @@ use atomesh::voronoi::voronoi;
 use atomesh::watch::Silent;
 use atomesh_io::atomic_file::AtomicFile;
 use atomesh_io::mesh::Provenance;
+use atomesh_io::mesh::cells::write_cells_vtu;
 use atomesh_io::mesh::cells::{
     AnyCells, CellData, CellReadError, ConnectionFiles, Flow, LoadedCells, ModflowFiles, Rock,
     read_cells, write_connections, write_connections_with_flow, write_modflow,
 };
-use atomesh_io::mesh::vtu::write_cells_vtu;
 
 /// A frame that turns, mirrors and stretches, with sites all over its box, sides included.
 fn flat() -> (Frame<2>, PolyMesh<2>) {

@@ -11,9 +11,9 @@ use atomesh::mesh::{Delaunay, PolyMesh};
 use atomesh::voronoi::voronoi;
 use atomesh::watch::Silent;
 use atomesh_io::mesh::Provenance;
-use atomesh_io::mesh::cells::{CellData, ConnectionFiles, poly_mesh_of, write_connections};
-use atomesh_io::mesh::polymesh::{read_poly_mesh, write_poly_mesh};
-use atomesh_io::mesh::vtu::write_cells_vtu;
+use atomesh_io::mesh::cells::write_cells_vtu;
+use atomesh_io::mesh::cells::{CellData, ConnectionFiles, foam_mesh_of, write_connections};
+use atomesh_io::mesh::openfoam::{read_foam_mesh, write_foam_mesh};
 
 /// A body-centred crystal in a box whose sides cut its cells.
 fn crystal() -> PolyMesh<3> {
@@ -162,10 +162,10 @@ fn polygons_in_a_file_run_counter_clockwise_and_fill_the_box() {
 fn open_foam_s_folder_reads_back_closed_with_sides_and_features() {
     let folder = tempfile::tempdir().unwrap();
     let path = folder.path().join("polyMesh");
-    for foam in [with_data(&crystal(), poly_mesh_of), with_data(&flat(), poly_mesh_of)] {
+    for foam in [with_data(&crystal(), foam_mesh_of), with_data(&flat(), foam_mesh_of)] {
         let foam = foam.unwrap();
-        write_poly_mesh(&path, &foam, &mut Silent).unwrap();
-        let read = read_poly_mesh(&path).unwrap();
+        write_foam_mesh(&path, &foam, &mut Silent).unwrap();
+        let read = read_foam_mesh(&path).unwrap();
         assert_eq!(read.validate(), Ok(()));
         assert_eq!((read.cell_count(), read.face_count()), (foam.cell_count(), foam.face_count()));
         let names: Vec<&str> = read.patches().iter().map(|p| p.name.as_str()).collect();

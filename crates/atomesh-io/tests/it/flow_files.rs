@@ -7,7 +7,8 @@ use atomesh::mesh::{Delaunay, Mesh, Quadratic};
 use atomesh::voronoi::voronoi;
 use atomesh::watch::Silent;
 use atomesh_io::mesh::cells::CellData;
-use atomesh_io::mesh::vtu::{write_broken_vtu, write_cells_vtu, write_cells_vtu_with};
+use atomesh_io::mesh::cells::{write_cells_vtu, write_cells_vtu_with};
+use atomesh_io::mesh::vtu::write_broken_vtu;
 use atomesh_io::mesh::{
     AnyMesh, CellFields, FacetFlux, FluxFiles, FluxTable, LoadedMesh, MeshData, Provenance,
     read_mesh, write_fluxes, write_mesh,

@@ -36,13 +36,13 @@ fn bytes_of(name: &str) -> Vec<u8> {
 }
 
 const WRITTEN: [(&str, ImageFormat); 7] = [
-    ("v.npy", ImageFormat::Npy),
-    ("v.nii", ImageFormat::Nifti),
-    ("v.nii.gz", ImageFormat::NiftiGz),
-    ("v.nrrd", ImageFormat::Nrrd),
-    ("v.vti", ImageFormat::Vti),
-    ("v.tif", ImageFormat::Tiff),
-    ("f.png", ImageFormat::Png),
+    ("v.npy", ImageFormat::NPY),
+    ("v.nii", ImageFormat::NIFTI),
+    ("v.nii.gz", ImageFormat::NIFTI_GZ),
+    ("v.nrrd", ImageFormat::NRRD),
+    ("v.vti", ImageFormat::VTI),
+    ("v.tif", ImageFormat::TIFF),
+    ("f.png", ImageFormat::PNG),
 ];
 
 #[test]
@@ -52,7 +52,7 @@ fn unknown_endings_are_answered_with_the_known_ones() {
         assert!(matches!(error.reason, ReadReason::UnknownExtension { .. }), "{error}");
         let text = error.to_string();
         assert!(text.starts_with(name), "{text}");
-        assert!(ImageFormat::EXTENSIONS.iter().all(|e| text.contains(e)), "{text}");
+        assert!(ImageFormat::endings().all(|e| text.contains(e)), "{text}");
     }
     let error = write_image(Path::new("scan.jpg"), &flat(2, 2), &mut Silent).unwrap_err();
     assert!(error.to_string().contains(".jpg") && error.to_string().contains(".npy"), "{error}");
@@ -60,7 +60,7 @@ fn unknown_endings_are_answered_with_the_known_ones() {
 
 #[test]
 fn every_listed_ending_is_known() {
-    for ending in ImageFormat::EXTENSIONS {
+    for ending in ImageFormat::endings() {
         let name = format!("Scan.of.1{}", ending.to_uppercase());
         assert!(ImageFormat::from_path(Path::new(&name)).is_some(), "{name}");
     }
@@ -79,7 +79,7 @@ fn formats_that_hold_a_frame_say_so() {
         assert_eq!(format.z_is_height(), framed.contains(ending), "{ending}");
     }
     let folder = tempfile::tempdir().unwrap();
-    assert_eq!(ImageFormat::of(folder.path()), Some(ImageFormat::Dicom));
+    assert_eq!(ImageFormat::of(folder.path()), Some(ImageFormat::DICOM));
 }
 
 #[test]
@@ -92,7 +92,7 @@ fn missing_files_folders_and_empty_files_are_named() {
     let error = read(&inside).unwrap_err();
     assert!(matches!(error.reason, ReadReason::Series(_)), "{error}");
     assert!(error.to_string().contains("folder.npy"), "{error}");
-    for ending in ImageFormat::EXTENSIONS {
+    for ending in ImageFormat::endings() {
         let empty = folder.path().join(format!("empty{ending}"));
         std::fs::write(&empty, "").unwrap();
         let error = read(&empty).unwrap_err();
@@ -153,12 +153,12 @@ fn raw_files_need_a_layout() {
 fn cut_files_are_refused_wherever_they_end() {
     for (name, format) in WRITTEN {
         let bytes = bytes_of(name);
-        let unneeded = match format {
-            // PNG's last chunk, IEND, carries no samples: its 12 bytes may be missing in part
-            ImageFormat::Png => 16,
-            // nor do the tags that close a VTI file
-            ImageFormat::Vti => b"\n</AppendedData>\n</VTKFile>\n".len(),
-            _ => 0,
+        let unneeded = if format == ImageFormat::PNG {
+            16 // the last chunk, IEND, carries no samples: its 12 bytes may be missing in part
+        } else if format == ImageFormat::VTI {
+            b"\n</AppendedData>\n</VTKFile>\n".len() // nor do these tags
+        } else {
+            0
         };
         let least = bytes.len() - unneeded;
         for length in 1..least {
@@ -318,6 +318,6 @@ proptest! {
         bytes.extend((text.len() as u16).to_le_bytes());
         bytes.extend(text.as_bytes());
         bytes.extend([0; 64]);
-        let _ = decode_image(&bytes, ImageFormat::Npy, &ReadOptions::default(), &mut Silent);
+        let _ = decode_image(&bytes, ImageFormat::NPY, &ReadOptions::default(), &mut Silent);
     }
 }

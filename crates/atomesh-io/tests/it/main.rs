@@ -6,7 +6,7 @@ mod flow_files;
 mod image_bad_input;
 mod image_round_trip;
 mod mesh_files;
-mod poly_mesh;
+mod foam_mesh;
 mod quadratic_files;
 mod real_images;
 mod scans;

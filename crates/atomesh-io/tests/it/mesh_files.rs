@@ -31,7 +31,7 @@ fn write<const D: usize>(format: MeshFormat, data: &MeshData<D>) -> Vec<u8> {
         MeshFormat::Vtk => write_vtk(&mut out, data, &mut Silent),
         MeshFormat::Npz => write_npz(&mut out, data, &mut Silent),
         MeshFormat::Msh(version, encoding) => {
-            write_msh(&mut out, data, (version, encoding), &mut Silent)
+            write_msh(&mut out, data, version, encoding, &mut Silent)
         }
         _ => unreachable!("{format:?} has no test"),
     };

@@ -226,10 +226,10 @@ fn a_scan_lies_in_the_same_place_whatever_file_it_comes_in() {
         ("right-anterior-superior", TURNED),
         ("LAS", [1.0, -1.0, 1.0]),
     ] {
-        check(&decode(&nrrd(space, signs), ImageFormat::Nrrd).unwrap(), TURNED, space);
+        check(&decode(&nrrd(space, signs), ImageFormat::NRRD).unwrap(), TURNED, space);
     }
     for extra in ["AnatomicalOrientation = RAI\n", "Modality = MET_MOD_CT\n"] {
-        check(&decode(&meta(extra), ImageFormat::MetaImage).unwrap(), TURNED, extra);
+        check(&decode(&meta(extra), ImageFormat::META_IMAGE).unwrap(), TURNED, extra);
     }
     check(&read(series(|_, _| {}).path()).unwrap(), TURNED, "DICOM");
 
@@ -272,15 +272,15 @@ fn whoever_reads_coordinates_that_are_turned_is_told_so() {
 #[test]
 fn coordinates_of_no_body_stand_as_they_are() {
     for space in ["3D-right-handed", "3D-left-handed", "scanner-xyz"] {
-        check(&decode(&nrrd(space, KEPT), ImageFormat::Nrrd).unwrap(), KEPT, space);
+        check(&decode(&nrrd(space, KEPT), ImageFormat::NRRD).unwrap(), KEPT, space);
     }
     let unnamed = String::from_utf8_lossy(&nrrd_header("", KEPT, "ascii").into_bytes())
         .replace("space: \n", "space dimension: 3\n");
     let words: Vec<_> = values().iter().map(i16::to_string).collect();
     let text = format!("{unnamed}\n{}", words.join("\n"));
-    check(&decode(text.as_bytes(), ImageFormat::Nrrd).unwrap(), KEPT, "space dimension");
+    check(&decode(text.as_bytes(), ImageFormat::NRRD).unwrap(), KEPT, "space dimension");
     for extra in ["", "AnatomicalOrientation = ???\n", "Modality = MET_MOD_OTHER\n"] {
-        check(&decode(&meta(extra), ImageFormat::MetaImage).unwrap(), KEPT, extra);
+        check(&decode(&meta(extra), ImageFormat::META_IMAGE).unwrap(), KEPT, extra);
     }
     let columns = |r: usize| AXES.iter().map(move |axis| axis[r].to_string());
     let direction = (0..3).flat_map(columns).collect::<Vec<_>>().join(" ");
@@ -292,7 +292,7 @@ fn coordinates_of_no_body_stand_as_they_are() {
          </DataArray></PointData></Piece></ImageData></VTKFile>",
         words.join(" ")
     );
-    check(&decode(vti.as_bytes(), ImageFormat::Vti).unwrap(), KEPT, "VTI");
+    check(&decode(vti.as_bytes(), ImageFormat::VTI).unwrap(), KEPT, "VTI");
 }
 
 #[test]
@@ -305,7 +305,7 @@ fn values_in_vtk_cells_sit_in_their_middles() {
         )
     };
     let cells = file("1 3 0 2 5 6", "CellData", "1 2 3 4");
-    let cells = decode(cells.as_bytes(), ImageFormat::Vti).unwrap();
+    let cells = decode(cells.as_bytes(), ImageFormat::VTI).unwrap();
     let folder = tempfile::tempdir().unwrap();
     let path = folder.path().join("cells.vti");
     fs::write(&path, file("1 3 0 2 5 6", "CellData", "1 2 3 4")).unwrap();
@@ -314,7 +314,7 @@ fn values_in_vtk_cells_sit_in_their_middles() {
     // one layer of cells between two of points: a flat image
     assert_eq!((cells.shape(), cells.origin()), (vec![2, 2], vec![13.0, 22.0]));
     let points = file("1 2 0 1 5 5", "PointData", "1 2 3 4");
-    let points = decode(points.as_bytes(), ImageFormat::Vti).unwrap();
+    let points = decode(points.as_bytes(), ImageFormat::VTI).unwrap();
     assert_eq!((points.shape(), points.origin()), (vec![2, 2], vec![12.0, 20.0]));
     assert_eq!(*points.samples(), Samples::U8(vec![1, 2, 3, 4]));
 }
@@ -360,7 +360,7 @@ fn samples_in_other_files_are_found_beside_the_header() {
     let error = read(&folder.path().join("h.mhd")).unwrap_err();
     assert!(error.to_string().contains("20 of 60"), "{error}");
     let alone =
-        message(format!("{header}ElementDataFile = all.raw\n").as_bytes(), ImageFormat::MetaImage);
+        message(format!("{header}ElementDataFile = all.raw\n").as_bytes(), ImageFormat::META_IMAGE);
     assert!(alone.contains("all.raw"), "{alone}");
 }
 
@@ -385,7 +385,7 @@ fn packed_samples_are_held_to_what_the_header_promises() {
         let meta = meta.replace("5 4 3", shape) + "ElementDataFile = LOCAL\n";
         let nrrd = [nrrd.as_bytes(), b"\n", &packed(samples, false)].concat();
         let meta = [meta.as_bytes(), &packed(samples, true)].concat();
-        [(nrrd, ImageFormat::Nrrd), (meta, ImageFormat::MetaImage)]
+        [(nrrd, ImageFormat::NRRD), (meta, ImageFormat::META_IMAGE)]
     };
     // what stands behind the samples is not unpacked
     let bomb = [bytes(), vec![0; 1 << 24]].concat();
@@ -403,7 +403,7 @@ fn packed_samples_are_held_to_what_the_header_promises() {
         );
     }
     for (mut file, format) in files("5 4 3", &bytes()) {
-        let sum = file.len() - if format == ImageFormat::Nrrd { 8 } else { 4 };
+        let sum = file.len() - if format == ImageFormat::NRRD { 8 } else { 4 };
         file[sum] ^= 1;
         assert!(decode(&file, format).is_err(), "{format}: a wrong check sum");
     }
@@ -415,7 +415,7 @@ fn what_an_nrrd_header_may_not_say_is_named() {
     let with = |from: &str, to: &str| {
         assert!(whole.contains(from), "{from}");
         let header = whole.replace(from, to);
-        message(&[header.as_bytes(), b"\n", &bytes()[..]].concat(), ImageFormat::Nrrd)
+        message(&[header.as_bytes(), b"\n", &bytes()[..]].concat(), ImageFormat::NRRD)
     };
     for (from, to, part) in [
         ("kinds: domain", "kinds: RGB-color", "5 values of kind \"rgb-color\""),
@@ -450,7 +450,7 @@ fn what_a_meta_header_may_not_say_is_named() {
     let with = |from: &str, to: &str| {
         assert!(whole[..start].contains(from), "{from}");
         let header = whole[..start].replace(from, to);
-        message(&[header.as_bytes(), &bytes()[..]].concat(), ImageFormat::MetaImage)
+        message(&[header.as_bytes(), &bytes()[..]].concat(), ImageFormat::META_IMAGE)
     };
     for (from, to, part) in [
         ("ObjectType = Image", "ObjectType = Tube", "Tube"),
@@ -560,11 +560,11 @@ fn stored_values_are_rescaled_and_white_is_turned_to_black() {
 #[test]
 fn a_single_slice_is_flat_and_keeps_its_place_if_that_is_flat_too() {
     let mut slice = Slice::of(0);
-    let upright = decode(&slice.bytes(), ImageFormat::Dicom).unwrap();
+    let upright = decode(&slice.bytes(), ImageFormat::DICOM).unwrap();
     assert_eq!((upright.shape(), upright.spacing()), (vec![5, 4], vec![0.5, 1.25]));
     assert_eq!((upright.origin(), upright.direction()[0][0]), (vec![0.0, 0.0], 1.0));
     slice.axes = [[0.0, 1.0, 0.0], [-1.0, 0.0, 0.0]];
-    let across = decode(&slice.bytes(), ImageFormat::Dicom).unwrap();
+    let across = decode(&slice.bytes(), ImageFormat::DICOM).unwrap();
     assert_eq!(across.origin(), [-10.0, 20.0]);
     assert_eq!(across.direction(), [[0.0, 1.0], [-1.0, 0.0]]);
     // under any name, and alone in a folder
@@ -617,9 +617,9 @@ fn files_of_other_programs_are_read_as_they_read_them() {
 /// A whole file of each kind.
 fn whole(which: usize) -> (Vec<u8>, ImageFormat) {
     match which {
-        0 => (nrrd("LPS", KEPT), ImageFormat::Nrrd),
-        1 => (meta("AnatomicalOrientation = RAI\n"), ImageFormat::MetaImage),
-        _ => (Slice::of(1).bytes(), ImageFormat::Dicom),
+        0 => (nrrd("LPS", KEPT), ImageFormat::NRRD),
+        1 => (meta("AnatomicalOrientation = RAI\n"), ImageFormat::META_IMAGE),
+        _ => (Slice::of(1).bytes(), ImageFormat::DICOM),
     }
 }
 
@@ -665,7 +665,7 @@ proptest! {
         nrrd in r"NRRD0004\n(((type|dimension|sizes|space|space directions|encoding|endian|space origin|data file|kinds|byte skip|line skip|axis mins|spacings): ?(uchar|double|2|3|raw|gzip|ascii|little|LIST|none|-?[0-9]{1,20}|\(-?[0-9],?[0-9]?\)| ){0,3})\n){0,9}\n?.{0,40}",
         meta in r"((NDims|DimSize|ElementType|ElementSpacing|HeaderSize|TransformMatrix|CompressedData|BinaryData) = ?(MET_UCHAR|MET_DOUBLE|True|False|-?[0-9]{1,20}| ){0,4}\n){0,9}(ElementDataFile = (LOCAL|LIST|%d 1 9|x))?\n.{0,40}",
     ) {
-        let _ = decode(nrrd.as_bytes(), ImageFormat::Nrrd);
-        let _ = decode(meta.as_bytes(), ImageFormat::MetaImage);
+        let _ = decode(nrrd.as_bytes(), ImageFormat::NRRD);
+        let _ = decode(meta.as_bytes(), ImageFormat::META_IMAGE);
     }
 }

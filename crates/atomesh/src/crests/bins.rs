@@ -5,7 +5,7 @@ use crate::geometry::{Bounds, Point};
 const NONE: u32 = u32::MAX;
 
 /// Cubes over a box, each with a list of points.
-#[derive(Debug)]
+#[derive(Clone, Debug)]
 pub(crate) struct Bins<const D: usize> {
     min: Point<D>,
     width: f64,
@@ -39,6 +39,27 @@ impl<const D: usize> Bins<D> {
     pub fn push(&mut self, p: &Point<D>) {
         let cube = self.index(&self.cube(p));
         self.next.push(std::mem::replace(&mut self.heads[cube], self.next.len() as u32));
+    }
+
+    /// Takes a point out that is at `p`; its number is not used again, but by [`Self::put_back`].
+    pub fn remove(&mut self, number: usize, p: &Point<D>) {
+        let cube = self.index(&self.cube(p));
+        let after = self.next[number];
+        let mut at = self.heads[cube] as usize;
+        if at == number {
+            self.heads[cube] = after;
+            return;
+        }
+        while self.next[at] as usize != number {
+            at = self.next[at] as usize;
+        }
+        self.next[at] = after;
+    }
+
+    /// Adds a point again that has been taken out, at `p`.
+    pub fn put_back(&mut self, number: usize, p: &Point<D>) {
+        let cube = self.index(&self.cube(p));
+        self.next[number] = std::mem::replace(&mut self.heads[cube], number as u32);
     }
 
     /// Visits all points within `reach` along every axis, and some more.

@@ -1,7 +1,7 @@
 //! The crests of b where it repels: the places where faces of Voronoi cells should fall.
 
 use super::{FeaturePoint, ValleySearch, bottoms, in_large_groups, strongest};
-use crate::fields::Fields;
+use crate::fields::FieldsView;
 use crate::watch::{Cancelled, Phase, Watch};
 
 /// The least b that counts, smoothed: below it lies what a nearly constant image has.
@@ -19,10 +19,10 @@ const HEIGHT_SHARE: f32 = 0.4;
 /// # Errors
 /// [`Cancelled`] if the watch ends the work.
 pub fn repelling_crests<const D: usize>(
-    fields: Fields<'_, D>,
+    fields: FieldsView<'_, D>,
     watch: &mut dyn Watch,
 ) -> Result<Vec<FeaturePoint<D>>, Cancelled> {
-    let Fields { potential, weight, distance } = fields;
+    let FieldsView { potential, weight, distance } = fields;
     if weight.as_constant() == Some(0.0) || potential.range().1 < LEAST_HEIGHT {
         return Ok(Vec::new());
     }

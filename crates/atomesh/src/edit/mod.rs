@@ -1,81 +1,41 @@
 //! Editing a lattice and its mesh, atom by atom.
 //!
-//! An [`Editor`] holds atoms and their Delaunay mesh. Atoms are added, moved and removed, and those around a
-//! place are optimized again: hot near it, cooler farther off, frozen beyond (Hale 2002: a temperature for each
-//! atom). The mesh follows at the cost of the change, and is always what connecting all atoms anew would give.
+//! An [`Editor`] holds atoms and their Delaunay mesh. Atoms are added, moved, removed and pinned, and the atoms
+//! around a place are optimized again: hot near it, cooler farther off, frozen beyond (Hale 2002: a temperature for
+//! each atom). Each edit says what it changed ([`Changes`]). The mesh is always the one that connecting all atoms
+//! again would give.
+//!
+//! Cost: that of the change. The editor keeps the cells' neighbours ([`cells`]), and which atoms are near a place.
 
 mod cells;
+mod changes;
+mod error;
+mod relax;
 #[cfg(test)]
 mod tests;
 
-use crate::energy::pair;
-use crate::fields::Fields;
+pub use changes::{AtomMove, Changes};
+pub use error::EditError;
+
+use std::fmt;
+
+use crate::crests::Bins;
 use crate::geometry::{Bounds, Point, distance_squared};
 use crate::lattice::Lattice;
 use crate::mesh::{ConnectError, Delaunay, Mesh};
-use crate::optimize::{OptimizeError, OptimizeOptions, OptimizeReport, optimize};
 use crate::watch::Watch;
 
-use cells::{Cells, Change};
+use cells::{AtomEdit, Cells};
+use changes::CellChanges;
 
 /// Names an atom as long as its editor lives.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Hash)]
 pub struct AtomId(u32);
 
-/// Why an edit was not made; nothing has changed then.
-#[derive(Clone, Debug, PartialEq, thiserror::Error)]
-#[non_exhaustive]
-pub enum EditError {
-    /// There is no such atom, or no longer.
-    #[error("there is no atom {}; it may have been removed", .atom.0)]
-    NoAtom {
-        /// The name used.
-        atom: AtomId,
-    },
-    /// A place outside the box, or not finite.
-    #[error("the place {point:?} is outside the box from {min:?} to {max:?}")]
-    Outside {
-        /// The place.
-        point: Vec<f64>,
-        /// The box's low corner.
-        min: Vec<f64>,
-        /// The box's high corner.
-        max: Vec<f64>,
-    },
-    /// An atom would leave the corner, edge or side of the box that it keeps.
-    #[error(
-        "atom {} would move along {}; the box holds it there", .atom.0, ["x", "y", "z"][*axis]
-    )]
-    Held {
-        /// The atom.
-        atom: AtomId,
-        /// 0 for x, 1 for y, 2 for z.
-        axis: usize,
-    },
-    /// A corner of the box would be without an atom.
-    #[error("atom {} is a corner of the box; the mesh needs it", .atom.0)]
-    Corner {
-        /// The atom.
-        atom: AtomId,
-    },
-    /// Another atom is there.
-    #[error("atom {} is at this place already", .atom.0)]
-    Occupied {
-        /// The other atom.
-        atom: AtomId,
-    },
-    /// The reach of an optimization is no length.
-    #[error("the reach is {value}; expected a length above 0")]
-    Reach {
-        /// The length asked for.
-        value: f64,
-    },
-    /// The atoms could not be optimized.
-    #[error(transparent)]
-    Optimize(#[from] OptimizeError),
-    /// The atoms could not be connected.
-    #[error(transparent)]
-    Connect(ConnectError),
+impl fmt::Display for AtomId {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        self.0.fmt(f)
+    }
 }
 
 /// A lattice and its Delaunay mesh, edited atom by atom.
@@ -93,8 +53,9 @@ pub enum EditError {
 /// # let options = GrowOptions::default();
 /// let lattice = grow(&Crystal::hexagonal(), grid.bounds(), &d, &options, &mut Silent)?;
 /// let mut editor = Editor::new(lattice, Delaunay::<2>::new(), &mut Silent)?;
-/// let well = editor.add([12.3, 17.1])?;
-/// editor.move_to(well, [12.8, 17.0])?;
+/// let (well, _) = editor.add([12.3, 17.1])?;
+/// let changes = editor.move_to(well, [12.8, 17.0])?;
+/// assert_eq!(changes.moves().len(), 1);
 /// let (mesh, atoms) = editor.mesh()?;
 /// assert_eq!(mesh.points().len(), atoms.len());
 /// # Ok::<(), Box<dyn std::error::Error>>(())
@@ -103,17 +64,34 @@ pub enum EditError {
 pub struct Editor<const D: usize> {
     delaunay: Delaunay<D>,
     bounds: Bounds<D>,
-    /// Atoms by name; where one has been removed its place stays, and is not used again.
+    /// Atoms by name. The place of a removed atom stays, and its name is not used again.
     points: Vec<Point<D>>,
-    is_atom: Vec<bool>,
-    /// Bit k: the box lets the atom move along axis k; 0 for an atom that is fixed otherwise too.
-    freedom: Vec<u8>,
+    states: Vec<State>,
+    /// All atoms but the removed ones.
+    bins: Bins<D>,
     cells: Cells<D>,
 }
 
+/// What is known of an atom besides its place.
+#[derive(Clone, Copy, Debug)]
+struct State {
+    is_removed: bool,
+    is_pinned: bool,
+    /// Bit k: the box lets the atom move along axis k.
+    freedom: u8,
+    /// 0 (frozen) to 1 (free).
+    temperature: f32,
+}
+
+impl State {
+    fn temperature_now(&self) -> f32 {
+        if self.is_pinned { 0.0 } else { self.temperature }
+    }
+}
+
 impl<const D: usize> Editor<D> {
-    /// Connects the atoms of a lattice. Atom i of the lattice has the name `names[i]` of
-    /// [`Self::atoms`]; those that its temperature freezes stay fixed.
+    /// Connects the atoms of a lattice. [`Self::atoms`] names them in the lattice's order. They keep their freedom
+    /// and temperature.
     ///
     /// # Errors
     /// [`EditError::Connect`] if the atoms make no mesh, or the watch ends the work.
@@ -124,12 +102,17 @@ impl<const D: usize> Editor<D> {
     ) -> Result<Self, EditError> {
         let points = lattice.atoms().to_vec();
         let mesh = delaunay.connect(&points, watch).map_err(EditError::Connect)?;
-        let own: Vec<u32> = (0..points.len() as u32).collect();
+        let state = |atom| State {
+            is_removed: false,
+            is_pinned: false,
+            freedom: lattice.freedom_in_box(atom),
+            temperature: lattice.temperature(atom),
+        };
         Ok(Self {
             delaunay,
             bounds: *lattice.bounds(),
-            freedom: lattice.freedom_of(&own, points.len()),
-            is_atom: vec![true; points.len()],
+            states: (0..points.len()).map(state).collect(),
+            bins: Bins::of(lattice.bounds(), 0.0, points.iter().copied()),
             cells: Cells::new(&mesh),
             points,
         })
@@ -137,8 +120,8 @@ impl<const D: usize> Editor<D> {
 
     /// The atoms and where they are, by name; those of the lattice first, in its order.
     pub fn atoms(&self) -> impl Iterator<Item = (AtomId, Point<D>)> {
-        let atoms = self.points.iter().zip(&self.is_atom).zip(0..);
-        atoms.filter(|((_, is_atom), _)| **is_atom).map(|((p, _), i)| (AtomId(i), *p))
+        let atoms = self.points.iter().zip(&self.states).zip(0..);
+        atoms.filter(|((_, state), _)| !state.is_removed).map(|((p, _), i)| (AtomId(i), *p))
     }
 
     /// Where an atom is.
@@ -146,109 +129,107 @@ impl<const D: usize> Editor<D> {
     /// # Errors
     /// [`EditError::NoAtom`].
     pub fn place(&self, atom: AtomId) -> Result<Point<D>, EditError> {
-        match self.is_atom.get(atom.0 as usize) {
-            Some(true) => Ok(self.points[atom.0 as usize]),
-            _ => Err(EditError::NoAtom { atom }),
-        }
+        self.state(atom).map(|_| self.points[atom.0 as usize])
     }
 
     /// Adds an atom; on a side of the box it will stay there.
     ///
     /// # Errors
     /// [`EditError`] if the place is outside the box or another atom's.
-    pub fn add(&mut self, at: Point<D>) -> Result<AtomId, EditError> {
+    pub fn add(&mut self, at: Point<D>) -> Result<(AtomId, Changes<D>), EditError> {
         self.check_inside(&at)?;
         let atom = self.points.len() as u32;
         self.points.push(at);
-        if let Err(error) = self.change(&[(atom, Some(at))]) {
-            self.points.pop();
-            return Err(error);
-        }
-        self.is_atom.push(true);
-        let is_free = |k: usize| self.bounds.min[k] < at[k] && at[k] < self.bounds.max[k];
-        self.freedom.push((0..D).fold(0, |set, k| set | u8::from(is_free(k)) << k));
-        Ok(AtomId(atom))
+        let cells = match self.follow(&[AtomEdit { atom, to: Some(at) }]) {
+            Ok(cells) => cells,
+            Err(error) => {
+                self.points.pop();
+                return Err(error);
+            }
+        };
+        let freedom = self.bounds.freedom(&at);
+        self.states.push(State { is_removed: false, is_pinned: false, freedom, temperature: 1.0 });
+        self.bins.push(&at);
+        Ok((AtomId(atom), Changes::new(cells, Vec::new())))
     }
 
     /// Removes an atom.
     ///
     /// # Errors
-    /// [`EditError`] if there is no such atom, or it is a corner of the box.
-    pub fn remove(&mut self, atom: AtomId) -> Result<(), EditError> {
-        let p = self.place(atom)?;
-        if (0..D).all(|k| p[k] == self.bounds.min[k] || p[k] == self.bounds.max[k]) {
+    /// [`EditError`] if there is no such atom, it is pinned, or it is a corner of the box.
+    pub fn remove(&mut self, atom: AtomId) -> Result<Changes<D>, EditError> {
+        let p = self.place_unpinned(atom)?;
+        if self.bounds.is_corner(&p) {
             return Err(EditError::Corner { atom });
         }
-        self.change(&[(atom.0, None)])?;
-        self.is_atom[atom.0 as usize] = false;
-        Ok(())
+        let cells = self.follow(&[AtomEdit { atom: atom.0, to: None }])?;
+        self.states[atom.0 as usize].is_removed = true;
+        self.bins.remove(atom.0 as usize, &p);
+        Ok(Changes::new(cells, Vec::new()))
     }
 
-    /// Moves an atom. One that lay inside the box and is put on a side stays there from then on.
+    /// Moves an atom, whatever its temperature. One that lay inside the box and is put on a side stays there from
+    /// then on.
     ///
     /// # Errors
-    /// [`EditError`] if there is no such atom, the place is outside the box or another atom's, or the atom
-    /// would leave its side of the box.
-    pub fn move_to(&mut self, atom: AtomId, to: Point<D>) -> Result<(), EditError> {
-        let from = self.place(atom)?;
+    /// [`EditError`] if there is no such atom, it is pinned, the place is outside the box or another atom's, or the
+    /// atom would leave its side of the box.
+    pub fn move_to(&mut self, atom: AtomId, to: Point<D>) -> Result<Changes<D>, EditError> {
+        let from = self.place_unpinned(atom)?;
         self.check_inside(&to)?;
-        let on_side =
-            |p: &Point<D>, k: usize| p[k] == self.bounds.min[k] || p[k] == self.bounds.max[k];
-        if let Some(axis) = (0..D).find(|&k| on_side(&from, k) && to[k] != from[k]) {
+        let held = self.bounds.held(&from);
+        if let Some(axis) = (0..D).find(|&k| held >> k & 1 == 1 && to[k] != from[k]) {
             return Err(EditError::Held { atom, axis });
         }
-        let held = (0..D).filter(|&k| on_side(&to, k)).fold(0, |set, k| set | 1 << k);
-        if from != to {
-            self.change(&[(atom.0, Some(to))])?;
-            self.points[atom.0 as usize] = to;
-            self.freedom[atom.0 as usize] &= !held;
-        }
+        let unmoved = from == to;
+        let edit = AtomEdit { atom: atom.0, to: Some(to) };
+        let changes = self.make(if unmoved { &[] } else { std::slice::from_ref(&edit) })?;
+        self.states[atom.0 as usize].freedom &= self.bounds.freedom(&to);
+        Ok(changes)
+    }
+
+    /// Pins an atom where it is: until it is unpinned it is not moved by [`Self::relax`], and [`Self::move_to`] and
+    /// [`Self::remove`] refuse it, so that no slip of the hand undoes a place that was chosen with care.
+    ///
+    /// # Errors
+    /// [`EditError::NoAtom`].
+    pub fn pin(&mut self, atom: AtomId) -> Result<(), EditError> {
+        self.state(atom)?;
+        self.states[atom.0 as usize].is_pinned = true;
         Ok(())
     }
 
-    /// Optimizes the atoms around a place again. With s = r/reach at a distance r, an atom's temperature is
-    /// 1 − 3s² + 2s³, falling smoothly from 1 to 0 at `reach` (Hale 2002); beyond it atoms are frozen, and those
-    /// near enough are felt. Cost: that of the atoms within reach.
+    /// Lets a pinned atom go; it has the temperature again that it had.
     ///
     /// # Errors
-    /// [`EditError`] if the reach is no length, an option is out of range, or the watch ends the work.
-    pub fn relax(
-        &mut self,
-        around: &Point<D>,
-        reach: f64,
-        fields: Fields<'_, D>,
-        options: &OptimizeOptions,
-        watch: &mut dyn Watch,
-    ) -> Result<OptimizeReport, EditError> {
-        if !(reach > 0.0 && reach.is_finite()) {
-            return Err(EditError::Reach { value: reach });
-        }
-        // atoms at the rim may move by as much again before they meet one that is left out
-        let felt = reach + 2.0 * pair::CUTOFF * fields.distance.greatest();
-        let mut part = Lattice::empty(self.bounds);
-        let mut names = Vec::new();
+    /// [`EditError::NoAtom`].
+    pub fn unpin(&mut self, atom: AtomId) -> Result<(), EditError> {
+        self.state(atom)?;
+        self.states[atom.0 as usize].is_pinned = false;
+        Ok(())
+    }
+
+    /// Whether an atom is pinned.
+    ///
+    /// # Errors
+    /// [`EditError::NoAtom`].
+    pub fn is_pinned(&self, atom: AtomId) -> Result<bool, EditError> {
+        self.state(atom).map(|state| state.is_pinned)
+    }
+
+    /// The atoms as a lattice, in the order of [`Self::atoms`], so that a run can go on from them. They have the
+    /// freedom and temperature that they came with; pinned ones are frozen, added ones free.
+    pub fn lattice(&self) -> Lattice<D> {
+        let mut lattice = Lattice::empty(self.bounds);
         for (AtomId(atom), p) in self.atoms() {
-            let r = distance_squared(&p, around).sqrt();
-            if r < felt {
-                let s = (r / reach).min(1.0);
-                let temperature = (1.0 - s * s * (3.0 - 2.0 * s)) as f32;
-                part.push(p, self.freedom[atom as usize], temperature.clamp(0.0, 1.0));
-                names.push(atom);
-            }
+            let state = &self.states[atom as usize];
+            lattice.push(p, state.freedom, state.temperature_now());
         }
-        let (part, report) = optimize(part, fields, options, watch)?.into_parts();
-        let moved = |(&atom, to): (&u32, &Point<D>)| {
-            (self.points[atom as usize] != *to).then_some((atom, Some(*to)))
-        };
-        let changes: Vec<Change<D>> = names.iter().zip(part.atoms()).filter_map(moved).collect();
-        self.change(&changes)?;
-        for (atom, to) in changes {
-            self.points[atom as usize] = to.unwrap_or(self.points[atom as usize]);
-        }
-        Ok(report)
+        lattice
     }
 
     /// The mesh, and the atom at each of its points. It is what [`Delaunay::connect`] gives for these atoms.
+    /// Cost: O(n log n).
     ///
     /// # Errors
     /// [`EditError::Connect`] if the atoms cannot be put in order: they are not finite.
@@ -261,19 +242,66 @@ impl<const D: usize> Editor<D> {
         Ok((mesh, names))
     }
 
-    fn change(&mut self, changes: &[Change<D>]) -> Result<(), EditError> {
-        if changes.is_empty() {
-            return Ok(());
+    /// The corners of all cells, D + 1 a cell, in the order of [`Changes`]: what these are changes of.
+    /// Cost: O(n log n).
+    pub fn cells(&self) -> Vec<AtomId> {
+        let mut corners: Vec<u32> = self.cells.all().flatten().copied().collect();
+        let cells = changes::in_order(&mut corners, D + 1);
+        cells.into_iter().flatten().map(|&atom| AtomId(atom)).collect()
+    }
+
+    /// Moves atoms to where they may be.
+    fn make(&mut self, edits: &[AtomEdit<D>]) -> Result<Changes<D>, EditError> {
+        let cells = self.follow(edits)?;
+        let mut moves = Vec::with_capacity(edits.len());
+        for &AtomEdit { atom, to } in edits {
+            let Some(to) = to else { continue };
+            let from = std::mem::replace(&mut self.points[atom as usize], to);
+            self.bins.remove(atom as usize, &from);
+            self.bins.put_back(atom as usize, &to);
+            moves.push(AtomMove { atom: AtomId(atom), from, to });
         }
-        match self.cells.change(&self.delaunay, &self.points, changes) {
-            Ok(_) => Ok(()),
-            Err(ConnectError::Duplicate { first, second }) => {
-                let changed = |atom: usize| changes.iter().any(|c| c.0 as usize == atom);
-                let other = if changed(first) { second } else { first };
-                Err(EditError::Occupied { atom: AtomId(other as u32) })
+        Ok(Changes::new(cells, moves))
+    }
+
+    /// Makes the cells follow.
+    fn follow(&mut self, edits: &[AtomEdit<D>]) -> Result<CellChanges, EditError> {
+        if edits.is_empty() {
+            return Ok(CellChanges::default());
+        }
+        self.cells.follow(&self.delaunay, &self.points, edits).map_err(|error| match error {
+            ConnectError::Duplicate { first, second } => {
+                let is_edited = |atom: usize| edits.iter().any(|edit| edit.atom as usize == atom);
+                let other = if is_edited(first) { second } else { first };
+                EditError::Occupied { atom: AtomId(other as u32) }
             }
-            Err(error) => Err(EditError::Connect(error)),
+            error => EditError::Connect(error),
+        })
+    }
+
+    /// The atoms nearer than `reach` to a place, ascending: in the same order whatever edits led here.
+    fn within(&self, around: &Point<D>, reach: f64) -> Vec<u32> {
+        let mut atoms = Vec::new();
+        self.bins.near(around, reach, |atom| {
+            if distance_squared(&self.points[atom], around).sqrt() < reach {
+                atoms.push(atom as u32);
+            }
+        });
+        atoms.sort_unstable();
+        atoms
+    }
+
+    fn state(&self, atom: AtomId) -> Result<&State, EditError> {
+        let state = self.states.get(atom.0 as usize).filter(|state| !state.is_removed);
+        state.ok_or(EditError::NoAtom { atom })
+    }
+
+    /// Where an atom is that may be moved by hand.
+    fn place_unpinned(&self, atom: AtomId) -> Result<Point<D>, EditError> {
+        if self.state(atom)?.is_pinned {
+            return Err(EditError::Pinned { atom });
         }
+        Ok(self.points[atom.0 as usize])
     }
 
     fn check_inside(&self, p: &Point<D>) -> Result<(), EditError> {

@@ -1,6 +1,6 @@
 //! What every engine promises, and the double sum that they are checked against.
 
-use crate::fields::ScalarField;
+use crate::fields::{FieldsView, ScalarField};
 use crate::geometry::{Point, difference, dot};
 
 use super::pair;
@@ -21,22 +21,51 @@ impl Energy {
     }
 }
 
+impl std::iter::Sum for Energy {
+    fn sum<I: Iterator<Item = Self>>(parts: I) -> Self {
+        parts.fold(Self::default(), |sum, part| Self {
+            atomic: sum.atomic + part.atomic,
+            image: sum.image + part.image,
+        })
+    }
+}
+
 /// Computes the total potential energy of atoms and its gradient.
+///
+/// `energy::conformance`, behind the cargo feature of that name, tests these promises.
 pub trait Engine<const D: usize>: Sync {
     /// Makes ready for atoms at or near `atoms`: reads d(x) and β(x) there, builds lists. To be called
     /// before the first evaluation and then between iterations; it does only what is due. `next_move` is
-    /// the farthest any atom may go before the next call, as a share of its nominal distance.
+    /// the farthest any atom may go before the next call, over its nominal distance.
     ///
-    /// Returns whether the energy is another function than before, so that what was learnt of its
-    /// curvature no longer holds.
+    /// Returns whether the energy is another function than before, so that the minimizer must forget its
+    /// curvature: always true of the first call, and of one with another number of atoms.
     fn prepare(&mut self, atoms: &[Point<D>], next_move: f64) -> bool;
 
-    /// The energy, and ∂P/∂x of every atom in `gradient`.
+    /// The energy, and ∂P/∂x of every atom, written to `gradient`: the same bits at any number of threads.
     fn evaluate(&mut self, atoms: &[Point<D>], gradient: &mut [Point<D>]) -> Energy;
 
     /// The nominal distance of every atom, as last read by [`Engine::prepare`].
     fn distances(&self) -> &[f64];
 }
+
+impl<E: Engine<D> + ?Sized, const D: usize> Engine<D> for Box<E> {
+    fn prepare(&mut self, atoms: &[Point<D>], next_move: f64) -> bool {
+        (**self).prepare(atoms, next_move)
+    }
+
+    fn evaluate(&mut self, atoms: &[Point<D>], gradient: &mut [Point<D>]) -> Energy {
+        (**self).evaluate(atoms, gradient)
+    }
+
+    fn distances(&self) -> &[f64] {
+        (**self).distances()
+    }
+}
+
+/// Makes an engine for atoms in some fields.
+pub type MakeEngine<'m, const D: usize> =
+    dyn for<'a> Fn(FieldsView<'a, D>) -> Box<dyn Engine<D> + 'a> + Sync + 'm;
 
 /// The total potential energy by the double sum of equation (1), and its gradient. O(n²): the reference.
 ///

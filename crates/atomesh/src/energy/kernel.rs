@@ -1,10 +1,10 @@
 //! The inner loop of the pairs engine.
 
-use crate::energy::pair;
 use crate::geometry::Point;
 
 use super::lanes::{Lanes, WIDTH};
 use super::neighbors::List;
+use super::pair;
 
 /// Below any squared distance of two atoms that are not at one place.
 const TINY: f64 = 1e-300;
@@ -55,79 +55,84 @@ impl Scale for Graded<'_> {
     }
 }
 
-/// ∂A/∂x of some atoms of a chunk, added to `slopes`; returns their energy, a pair's half to either.
-///
-/// `lists` are those of the `members`, in the chunk's `neighbors`.
+/// Some atoms of a chunk.
+pub(super) struct Members<'a> {
+    pub atoms: &'a [u32],
+    /// The list of each.
+    pub lists: &'a [List],
+    /// The neighbours of all lists of the chunk.
+    pub neighbors: &'a [u32],
+}
+
+/// ∂A/∂x of some atoms, added to `slopes`; returns their energy, a pair's half to either.
 #[inline(always)]
 pub(super) fn add_pairs<L: Lanes, S: Scale, const D: usize>(
     atoms: &[Point<D>],
-    members: &[u32],
-    (lists, neighbors): (&[List], &[u32]),
+    members: Members<'_>,
     scale: &S,
     slopes: &mut [Point<D>],
 ) -> f64 {
     let mut energy = 0.0;
-    for ((slope, &i), list) in slopes.iter_mut().zip(members).zip(lists) {
-        let others = neighbors[list.start as usize..][..list.padded()].as_chunks().0;
-        let (pairs, pull) = sum::<L, S, D>(atoms, i as usize, others, list.surplus(), scale);
+    for ((slope, &i), list) in slopes.iter_mut().zip(members.atoms).zip(members.lists) {
+        let others = members.neighbors[list.start as usize..][..list.padded()].as_chunks().0;
+        let i = i as usize;
+        let atom = Atom::<L, S, D> { atoms, i, at: atoms[i].map(L::splat), scale };
+        let (pairs, pull) = atom.sum(others, list.surplus());
         energy += 0.5 * pairs;
         (0..D).for_each(|k| slope[k] += pull[k]);
     }
     energy
 }
 
-/// Σ w φ(r/d) over others of atom i, and its gradient Σ w f(r/d)/(d r) v: [`WIDTH`] of them side by
-/// side, without a branch on the cut-off; the last `surplus` others do not count.
-#[inline(always)]
-fn sum<L: Lanes, S: Scale, const D: usize>(
-    atoms: &[Point<D>],
+/// An atom whose pairs are summed.
+struct Atom<'a, L: Lanes, S, const D: usize> {
+    atoms: &'a [Point<D>],
+    /// Its number.
     i: usize,
-    others: &[[u32; WIDTH]],
-    surplus: usize,
-    scale: &S,
-) -> (f64, Point<D>) {
-    let mut sums = [L::splat(0.0); WIDTH];
-    if let Some((last, whole)) = others.split_last() {
-        let at = atoms[i].map(L::splat);
-        let all = L::splat(pair::CUTOFF);
-        for others in whole {
-            add_block::<L, S, D>(atoms, (i, &at), others, all, scale, &mut sums);
-        }
-        let some = L::wide(CUTOFFS[surplus]);
-        add_block::<L, S, D>(atoms, (i, &at), last, some, scale, &mut sums);
-    }
-    let [energy, pull @ ..] = L::totals(sums);
-    (energy, std::array::from_fn(|k| pull[k]))
+    /// Where it is.
+    at: [L::Wide; D],
+    scale: &'a S,
 }
 
-/// Adds the energy of the pairs of atom i with some others, and its gradient, to `sums`.
-#[inline(always)]
-fn add_block<L: Lanes, S: Scale, const D: usize>(
-    atoms: &[Point<D>],
-    (i, at): (usize, &[L::Wide; D]),
-    others: &[u32; WIDTH],
-    cutoff: L::Wide,
-    scale: &S,
-    sums: &mut [L::Wide; WIDTH],
-) {
-    // SAFETY: lists hold indices of atoms.
-    let (columns, (inverse_squared, weight)) =
-        unsafe { (L::columns(atoms, others), scale.of::<L>(i, others)) };
-    let v: [L::Wide; D] = std::array::from_fn(|k| L::sub(columns[k], at[k]));
-    let mut r_squared = L::mul(v[0], v[0]);
-    for v in &v[1..] {
-        r_squared = L::add(r_squared, L::mul(*v, *v));
+impl<L: Lanes, S: Scale, const D: usize> Atom<'_, L, S, D> {
+    /// Σ w φ(r/d) over its pairs with others, and the gradient Σ w f(r/d)/(d r) v: [`WIDTH`] of them side by
+    /// side, without a branch on the cut-off; the last `surplus` others do not count.
+    #[inline(always)]
+    fn sum(&self, others: &[[u32; WIDTH]], surplus: usize) -> (f64, Point<D>) {
+        let mut sums = [L::splat(0.0); WIDTH];
+        if let Some((last, whole)) = others.split_last() {
+            let all = L::splat(pair::CUTOFF);
+            for others in whole {
+                self.add_block(others, all, &mut sums);
+            }
+            self.add_block(last, L::wide(CUTOFFS[surplus]), &mut sums);
+        }
+        let [energy, pull @ ..] = L::totals(sums);
+        (energy, std::array::from_fn(|k| pull[k]))
     }
-    let u_squared = L::mul(r_squared, inverse_squared);
-    let u = L::sqrt(u_squared);
-    let phi = energy_inside::<L>(u, u_squared);
-    sums[0] = L::add(sums[0], L::where_less(u, cutoff, L::mul(weight, phi)));
-    // two atoms at one place push nowhere: v is 0
-    let scale = L::div(L::mul(weight, inverse_squared), L::max(u_squared, L::splat(TINY)));
-    let force = L::mul(u, force_inside::<L>(u, u_squared));
-    let slope = L::where_less(u, cutoff, L::mul(scale, force));
-    for k in 0..D {
-        sums[1 + k] = L::add(sums[1 + k], L::mul(slope, v[k]));
+
+    /// Adds the energy of its pairs with some others, and the gradient, to `sums`.
+    #[inline(always)]
+    fn add_block(&self, others: &[u32; WIDTH], cutoff: L::Wide, sums: &mut [L::Wide; WIDTH]) {
+        // SAFETY: lists hold indices of atoms.
+        let (columns, (inverse_squared, weight)) =
+            unsafe { (L::columns(self.atoms, others), self.scale.of::<L>(self.i, others)) };
+        let v: [L::Wide; D] = std::array::from_fn(|k| L::sub(columns[k], self.at[k]));
+        let mut r_squared = L::mul(v[0], v[0]);
+        for v in &v[1..] {
+            r_squared = L::add(r_squared, L::mul(*v, *v));
+        }
+        let u_squared = L::mul(r_squared, inverse_squared);
+        let u = L::sqrt(u_squared);
+        let phi = energy_inside::<L>(u, u_squared);
+        sums[0] = L::add(sums[0], L::where_less(u, cutoff, L::mul(weight, phi)));
+        // two atoms at one place push nowhere: v is 0
+        let scale = L::div(L::mul(weight, inverse_squared), L::max(u_squared, L::splat(TINY)));
+        let force = L::mul(u, force_inside::<L>(u, u_squared));
+        let slope = L::where_less(u, cutoff, L::mul(scale, force));
+        for k in 0..D {
+            sums[1 + k] = L::add(sums[1 + k], L::mul(slope, v[k]));
+        }
     }
 }
 

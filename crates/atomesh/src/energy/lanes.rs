@@ -1,4 +1,4 @@
-//! Lanes side by side: the steps of the kernels that compilers do not put into wide registers themselves.
+//! Operations on several numbers at once, where compilers do not vectorise the kernels themselves.
 //!
 //! [`Plain`] is the reference, for any processor; [`Avx2`] does the same with 256-bit instructions. Both
 //! move and compare numbers, or round each operation once, so their results are the same to the last bit.
@@ -9,7 +9,7 @@ pub(super) const LANES: usize = crate::geometry::BLOCK;
 /// Lanes of double precision.
 pub(super) const WIDTH: usize = 4;
 
-/// What is done to lanes at once.
+/// Operations on lanes.
 pub(super) trait Lanes: Copy {
     /// [`WIDTH`] numbers of double precision.
     type Wide: Copy;
@@ -289,13 +289,17 @@ mod tests {
             .map(|l| std::array::from_fn(|k| (f64::from(l) - 3.1) / f64::from(k as u32 + 3)))
             .chain([[f64::INFINITY, f64::NAN, -0.0]])
             .collect();
-        let (flat, halves) = (table.as_flattened(), table.as_flattened().as_chunks().0);
+        let (numbers, halves) = (table.as_flattened(), table.as_flattened().as_chunks().0);
         let mut out = Vec::new();
         for first in 0..6 {
             let places = [first + 4, first, first + 3, first + 1];
             // SAFETY: all places are within the tables, of ten and more.
             let ([a, b, c], [d, e], f) = unsafe {
-                (L::columns(&table, &places), L::columns(halves, &places), L::pick(flat, &places))
+                (
+                    L::columns(&table, &places),
+                    L::columns(halves, &places),
+                    L::pick(numbers, &places),
+                )
             };
             let all = [
                 L::add(a, e),
@@ -310,7 +314,7 @@ mod tests {
                 f,
                 L::wide(L::totals([a, d, e, f])),
             ];
-            // which of many NaNs comes out is nobody's concern
+            // NaNs may differ in their bits
             let bits = |x: f64| if x.is_nan() { u64::MAX } else { x.to_bits() };
             out.extend(all.into_iter().flat_map(|wide| L::lanes(wide).map(bits)));
         }

@@ -6,6 +6,8 @@
 //! [`PairsEngine`], neighbour lists, O(n) in atoms, the default. All leave out the printed sum's
 //! i = j, a constant n·153/512 that moves no atom.
 
+#[cfg(feature = "conformance")]
+pub mod conformance;
 mod engine;
 mod kernel;
 mod lanes;
@@ -17,6 +19,6 @@ mod tree;
 #[cfg(test)]
 mod tests;
 
-pub use engine::{Energy, Engine, direct_energy};
+pub use engine::{Energy, Engine, MakeEngine, direct_energy};
 pub use pairs::PairsEngine;
 pub use sampled::SampledEngine;

@@ -1,4 +1,4 @@
-//! Neighbour lists: for every atom, who is or may soon be within its cut-off.
+//! Neighbour lists: for every atom, the others that are or may soon be within its cut-off.
 //!
 //! Found by a descent through the tree of boxes that 512 atoms, then 64 of them, then 8 share. Lists hold
 //! each pair twice, once for either atom: an atom can then gather its own sum, in the same order at any
@@ -144,14 +144,8 @@ impl<const D: usize> Search<'_, D> {
                     if chunk.neighbors.len() < room {
                         chunk.neighbors.resize(room + room / 4, 0);
                     }
-                    end = list_atom::<L, D>(
-                        tree,
-                        block,
-                        lane,
-                        &close[..count],
-                        &mut chunk.neighbors,
-                        end,
-                    );
+                    let (at, close) = (AtLane { block, lane }, &close[..count]);
+                    end = list_atom::<L, D>(tree, at, close, &mut chunk.neighbors, end);
                     let list = List { start: start as u32, count: (end - start) as u32 };
                     chunk.lists.push(list);
                     let found = &mut chunk.neighbors[start..end + WIDTH];
@@ -166,12 +160,18 @@ impl<const D: usize> Search<'_, D> {
     }
 }
 
+/// The place of an atom in the tree.
+#[derive(Clone, Copy)]
+struct AtLane {
+    block: usize,
+    lane: usize,
+}
+
 /// Appends the neighbours of one atom among those of `blocks` from `end` on; returns the new end.
 #[inline(always)]
 fn list_atom<L: Lanes, const D: usize>(
     tree: &Tree<D>,
-    block: usize,
-    lane: usize,
+    AtLane { block, lane }: AtLane,
     blocks: &[u32],
     neighbors: &mut [u32],
     mut end: usize,
@@ -250,9 +250,9 @@ mod tests {
             .collect()
     }
 
-    /// All within reach are listed, and nobody farther than rounding to single precision explains.
+    /// All within reach are listed, and none farther than rounding to single precision explains.
     fn assert_lists<const D: usize>(atoms: &[Point<D>], range: &[f64], what: &str) {
-        let extent = Bounds::of(atoms).unwrap().extent().into_iter().fold(0.0, f64::max);
+        let extent = Bounds::of(atoms).unwrap().longest_edge();
         let longer: Vec<f64> = range.iter().map(|r| r * (1.0 + 1e-5) + 1e-5 * extent).collect();
         let (least, most) = (direct(atoms, range), direct(atoms, &longer));
         for (i, found) in lists_of(atoms, range).iter().enumerate() {

@@ -2,26 +2,24 @@
 //!
 //! The total potential field p(x) of equation (5) is accumulated on the image's own samples from
 //! tabulated potentials; P is read at the sample nearest to each atom, equation (6), and its gradient by
-//! centred differences. Cost: O(N) in image samples, some 8N additions in 2-D and 20N in 3-D.
+//! centred differences. Cost: O(N) in image samples, some 8N additions in the plane and 20N in space.
 //!
 //! Energy and gradient do not quite belong together: the energy is constant within a sample. Atoms count
-//! as if at their nearest samples, so what it errs by against the double sum is of first order in 1/d, d
-//! in samples: in a lattice at d = 8 the gradient, times d, by 0.1, half as much at 16; the energy of
-//! an atom by 0.004 and less, since errors of neighbouring pairs cancel in part. Atoms on the image's
+//! as if at their nearest samples, so the error against the double sum is of first order in 1/d, d in
+//! samples. In a lattice at d = 8 that of the gradient, times d, is 0.1, and half as much at d = 16; that of
+//! an atom's energy is 0.004 or less, since errors of neighbouring pairs cancel in part. Atoms on the image's
 //! boundary feel their own tables along its normal, where differences are one-sided.
 
 use std::ops::Range;
 
 use rayon::prelude::*;
 
-use crate::energy::pair;
-use crate::fields::NominalDistance;
+use crate::fields::{FieldsView, centred_difference};
 use crate::geometry::Point;
 use crate::image::Grid;
 
-use crate::fields::{ImageWeight, ScalarField, centred_difference};
-
 use super::engine::{Energy, Engine};
+use super::pair;
 
 /// Nominal distances of neighbouring tables differ by this ratio.
 const TABLE_RATIO: f64 = 1.02;
@@ -123,9 +121,7 @@ const CHUNK: usize = 2048;
 ///
 /// Source: Hale (2001), algorithm 1. Departure: the atom's own φ(0), which moves nothing, is left out.
 pub struct SampledEngine<'a, const D: usize> {
-    potential: &'a ScalarField<D>,
-    weight: &'a ImageWeight<D>,
-    distance: &'a NominalDistance<D>,
+    fields: FieldsView<'a, D>,
     tables: Vec<Table<D>>,
     field: Vec<f32>,
     distances: Vec<f64>,
@@ -133,11 +129,8 @@ pub struct SampledEngine<'a, const D: usize> {
 
 impl<'a, const D: usize> SampledEngine<'a, D> {
     /// An engine for atoms in these fields; tabulates φ for the nominal distances there are.
-    pub fn new(
-        potential: &'a ScalarField<D>,
-        weight: &'a ImageWeight<D>,
-        distance: &'a NominalDistance<D>,
-    ) -> Self {
+    pub fn new(fields: FieldsView<'a, D>) -> Self {
+        let FieldsView { potential, distance, .. } = fields;
         let (least, greatest) = (distance.least(), distance.greatest());
         let count = ((greatest / least).ln() / TABLE_RATIO.ln()).ceil() as usize + 1;
         let grid = potential.grid();
@@ -145,7 +138,7 @@ impl<'a, const D: usize> SampledEngine<'a, D> {
             .into_par_iter()
             .map(|t| Table::new((least * TABLE_RATIO.powi(t as i32)).min(greatest), grid))
             .collect();
-        Self { potential, weight, distance, tables, field: Vec::new(), distances: Vec::new() }
+        Self { fields, tables, field: Vec::new(), distances: Vec::new() }
     }
 
     /// The total potential field p(x) of equation (5), x fastest, as of the last evaluation: what the
@@ -158,24 +151,25 @@ impl<'a, const D: usize> SampledEngine<'a, D> {
         if self.tables.len() == 1 {
             return 0;
         }
-        let t = (self.distance.at(atom) / self.distance.least()).ln() / TABLE_RATIO.ln();
+        let t =
+            (self.fields.distance.at(atom) / self.fields.distance.least()).ln() / TABLE_RATIO.ln();
         (t.round() as usize).min(self.tables.len() - 1)
     }
 
     /// Fills one slab of the field: β b, then every atom's table rows that fall into it, in order.
     fn fill(&self, slab: &mut [f32], first_plane: usize, atoms: &Centres<D>) {
-        let grid = self.potential.grid();
+        let grid = self.fields.potential.grid();
         let plane: usize = grid.shape[..D - 1].iter().product();
         let planes = slab.len() / plane;
         let start = first_plane * plane;
-        let b = &self.potential.samples()[start..start + slab.len()];
-        match self.weight.as_constant() {
+        let b = &self.fields.potential.samples()[start..start + slab.len()];
+        match self.fields.weight.as_constant() {
             Some(beta) => {
                 slab.iter_mut().zip(b).for_each(|(p, b)| *p = beta as f32 * b);
             }
             None => {
                 for (i, (p, b)) in slab.iter_mut().zip(b).enumerate() {
-                    *p = self.weight.at(&sample_position(grid, start + i)) as f32 * b;
+                    *p = self.fields.weight.at(&grid.position(start + i)) as f32 * b;
                 }
             }
         }
@@ -204,13 +198,14 @@ impl<'a, const D: usize> SampledEngine<'a, D> {
         atoms: &[Point<D>],
         gradient: &mut [Point<D>],
     ) -> Energy {
-        let grid = self.potential.grid();
+        let grid = self.fields.potential.grid();
         let strides = grid.strides();
         let own = pair::SELF_ENERGY as f32;
         let mut energy = Energy::default();
         for ((centre, atom), g) in centres.iter().zip(atoms).zip(gradient) {
             let at: usize = (0..D).map(|k| centre.index[k] as usize * strides[k]).sum();
-            let image = self.weight.at(atom) * f64::from(self.potential.samples()[at]);
+            let image =
+                self.fields.weight.at(atom) * f64::from(self.fields.potential.samples()[at]);
             let atomic = f64::from(field[at]) - f64::from(centre.weight * own) - image;
             energy.image += image;
             energy.atomic += 0.5 * atomic;
@@ -233,7 +228,7 @@ impl<'a, const D: usize> SampledEngine<'a, D> {
         row: &Row<D>,
         values: &[f32],
     ) {
-        let grid = self.potential.grid();
+        let grid = self.fields.potential.grid();
         let plane: usize = grid.shape[..D - 1].iter().product();
         let planes = (slab.len() / plane) as isize;
         let mut at = 0isize;
@@ -336,25 +331,17 @@ impl<const D: usize> Centres<D> {
     }
 }
 
-fn sample_position<const D: usize>(grid: &Grid<D>, mut index: usize) -> Point<D> {
-    std::array::from_fn(|k| {
-        let i = index % grid.shape[k];
-        index /= grid.shape[k];
-        i as f64 * grid.step[k]
-    })
-}
-
 impl<const D: usize> Engine<D> for SampledEngine<'_, D> {
     fn prepare(&mut self, atoms: &[Point<D>], _next_move: f64) -> bool {
-        // The field is read anew at every evaluation; only the caller's view of d is refreshed here.
+        // The field is made again at every evaluation; only the caller's view of d is refreshed here.
         let first = self.distances.len() != atoms.len();
-        let distance = self.distance;
+        let distance = self.fields.distance;
         atoms.par_iter().map(|p| distance.at(p)).collect_into_vec(&mut self.distances);
         first
     }
 
     fn evaluate(&mut self, atoms: &[Point<D>], gradient: &mut [Point<D>]) -> Energy {
-        let grid = *self.potential.grid();
+        let grid = *self.fields.potential.grid();
         let centres: Vec<Centre<D>> = atoms
             .par_iter()
             .map(|p| Centre {
@@ -362,7 +349,7 @@ impl<const D: usize> Engine<D> for SampledEngine<'_, D> {
                     ((p[k] / grid.step[k] + 0.5) as usize).min(grid.shape[k] - 1) as u32
                 }),
                 table: self.table_of(p) as u32,
-                weight: 1.0 - self.weight.at(p) as f32,
+                weight: 1.0 - self.fields.weight.at(p) as f32,
             })
             .collect();
         let reach = self.tables.iter().map(|t| t.reach[D - 1]).max().unwrap_or(0) as usize;
@@ -384,10 +371,7 @@ impl<const D: usize> Engine<D> for SampledEngine<'_, D> {
             })
             .collect();
         self.field = field;
-        parts.iter().fold(Energy::default(), |sum, part| Energy {
-            atomic: sum.atomic + part.atomic,
-            image: sum.image + part.image,
-        })
+        parts.into_iter().sum()
     }
 
     fn distances(&self) -> &[f64] {

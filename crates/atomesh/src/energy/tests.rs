@@ -3,8 +3,9 @@
 use rand::{RngExt, SeedableRng};
 use rand_pcg::Pcg64;
 
-use crate::fields::{ImageWeight, Interpolation, ScalarField};
+use crate::fields::{FieldsView, ImageWeight, Interpolation, ScalarField};
 
+use super::conformance::{Claims, check};
 use super::*;
 use crate::energy::pair;
 use crate::fields::NominalDistance;
@@ -29,16 +30,7 @@ const WEIGHTS: [Weight; 4] =
     [Weight::Constant(0.0), Weight::Constant(0.4), Weight::Constant(1.0), Weight::Field];
 
 fn sample<const D: usize>(grid: &Grid<D>, f: impl Fn(&Point<D>) -> f64) -> Vec<f32> {
-    (0..grid.sample_count())
-        .map(|mut i| {
-            let p = std::array::from_fn(|k| {
-                let index = i % grid.shape[k];
-                i /= grid.shape[k];
-                index as f64 * grid.step[k]
-            });
-            f(&p) as f32
-        })
-        .collect()
+    (0..grid.sample_count()).map(|i| f(&grid.position(i)) as f32).collect()
 }
 
 fn wave<const D: usize>(p: &Point<D>) -> f64 {
@@ -50,7 +42,8 @@ impl<const D: usize> Scene<D> {
     fn new(weight: Weight, varying: bool, seed: u64) -> Self {
         let step: [f64; D] = std::array::from_fn(|k| [1.0, 0.8, 1.25][k]);
         let grid = Grid { shape: std::array::from_fn(|k| (20.0 / step[k]) as usize + 1), step };
-        let potential = ScalarField::new(grid, sample(&grid, wave), Interpolation::Spline).unwrap();
+        let potential =
+            ScalarField::potential(grid, sample(&grid, wave), Interpolation::Spline).unwrap();
         let weight = match weight {
             Weight::Constant(weight) => ImageWeight::constant(weight).unwrap(),
             Weight::Field => {
@@ -73,8 +66,12 @@ impl<const D: usize> Scene<D> {
         Self { potential, weight, distance, atoms }
     }
 
+    fn fields(&self) -> FieldsView<'_, D> {
+        FieldsView { potential: &self.potential, weight: &self.weight, distance: &self.distance }
+    }
+
     fn engine(&self) -> PairsEngine<'_, D> {
-        PairsEngine::new(&self.potential, &self.weight, &self.distance)
+        PairsEngine::new(self.fields())
     }
 
     /// The double sum, d and β read at `listed`.
@@ -121,6 +118,22 @@ fn jolted<const D: usize>(atoms: &[Point<D>], reach: f64, seed: u64) -> Vec<Poin
         .collect()
 }
 
+#[test]
+fn the_pairs_engine_satisfies_all_laws_to_rounding() {
+    let claims = Claims::default();
+    check::<2>(&|fields| Box::new(PairsEngine::new(fields)), &claims).unwrap();
+    check::<3>(&|fields| Box::new(PairsEngine::new(fields)), &claims).unwrap();
+}
+
+/// Energy and gradient do not quite belong together, nor are they quite the double sum's; see below by how much.
+/// The field is summed in single precision, 6e-8 for each of some 30 terms below 1 at an atom.
+#[test]
+fn the_sampled_engine_is_symmetric_to_single_precision() {
+    let claims = Claims { direct: None, slope: None, symmetry: Some(4e-6) };
+    check::<2>(&|fields| Box::new(SampledEngine::new(fields)), &claims).unwrap();
+    check::<3>(&|fields| Box::new(SampledEngine::new(fields)), &claims).unwrap();
+}
+
 fn pairs_equal_the_double_sum<const D: usize>() {
     for (case, weight) in WEIGHTS.into_iter().enumerate() {
         for varying in [false, true] {
@@ -141,7 +154,7 @@ fn pairs_equal_the_double_sum<const D: usize>() {
                 &format!("{what}, moved a little"),
             );
 
-            // beyond it they are read anew
+            // beyond it they are read again
             let far = jolted(&scene.atoms, 1.0 * scene.distance.greatest(), 2);
             let changed = varying || matches!(weight, Weight::Field);
             assert_eq!(engine.prepare(&far, 0.1), changed, "{what}");
@@ -185,35 +198,6 @@ fn a_lattice_without_atoms_or_with_one_has_no_pairs() {
     assert_eq!((energy.atomic, energy.image), (0.0, 0.25 * scene.potential.value(&alone[0])));
 }
 
-fn gradient_is_the_slope<const D: usize>() {
-    for weight in WEIGHTS {
-        let scene = Scene::<D>::new(weight, true, 3);
-        let mut engine = scene.engine();
-        engine.prepare(&scene.atoms, 0.1);
-        let (_, gradient) = evaluate(&mut engine, &scene.atoms);
-        let h = 1e-5;
-        for i in (0..scene.atoms.len()).step_by(17) {
-            for k in 0..D {
-                let mut energy_at = |x: f64| {
-                    let mut atoms = scene.atoms.clone();
-                    atoms[i][k] += x;
-                    evaluate(&mut engine, &atoms).0.total()
-                };
-                let slope = (energy_at(h) - energy_at(-h)) / (2.0 * h);
-                // rounding: 1e-16 · |P| of some 100 / h = 1e-9; at the cut-off φ″ jumps by
-                // 1.3 / d², which costs a quarter of h times that: 4e-7
-                assert!((slope - gradient[i][k]).abs() < 1e-6, "{D}-D {weight:?} {i} {k}");
-            }
-        }
-    }
-}
-
-#[test]
-fn the_gradient_is_the_slope_of_the_energy() {
-    gradient_is_the_slope::<2>();
-    gradient_is_the_slope::<3>();
-}
-
 #[test]
 fn atoms_at_one_place_push_nowhere_and_count_once_each() {
     let mut scene = Scene::<3>::new(Weight::Constant(0.0), false, 9);
@@ -255,29 +239,6 @@ fn energy_is_the_same_wherever_and_in_whatever_order_the_atoms_are() {
     }
 }
 
-fn on_threads<T: Send>(count: usize, work: impl FnOnce() -> T + Send) -> T {
-    rayon::ThreadPoolBuilder::new().num_threads(count).build().unwrap().install(work)
-}
-
-#[test]
-fn both_engines_give_the_same_bits_at_any_number_of_threads() {
-    let mut scene = Scene::<3>::new(Weight::Field, true, 13);
-    // several chunks of work
-    for seed in 0..7 {
-        scene.atoms.extend(Scene::<3>::new(Weight::Field, true, 100 + seed).atoms);
-    }
-    let bits = |threads: usize| {
-        on_threads(threads, || {
-            let mut pairs = scene.engine();
-            let mut sampled = SampledEngine::new(&scene.potential, &scene.weight, &scene.distance);
-            pairs.prepare(&scene.atoms, 0.1);
-            sampled.prepare(&scene.atoms, 0.1);
-            (evaluate(&mut pairs, &scene.atoms), evaluate(&mut sampled, &scene.atoms))
-        })
-    };
-    assert_eq!(bits(1), bits(3));
-}
-
 /// Atoms on samples, some on the image's boundary: nothing is rounded but table entries.
 fn on_samples<const D: usize>(scene: &mut Scene<D>) {
     let grid = *scene.potential.grid();
@@ -296,7 +257,7 @@ fn on_samples<const D: usize>(scene: &mut Scene<D>) {
 fn the_field_is_equation_5<const D: usize>(weight: Weight) {
     let mut scene = Scene::<D>::new(weight, false, 0);
     on_samples(&mut scene);
-    let mut engine = SampledEngine::new(&scene.potential, &scene.weight, &scene.distance);
+    let mut engine = SampledEngine::new(scene.fields());
     engine.prepare(&scene.atoms, 0.1);
     let (energy, _) = evaluate(&mut engine, &scene.atoms);
     let grid = *scene.potential.grid();
@@ -335,9 +296,11 @@ fn the_sampled_field_is_equation_5_also_at_the_boundary_and_with_unequal_steps()
 fn sampling_errors(d: f64) -> (f64, f64) {
     let grid = Grid { shape: [(12.0 * d) as usize + 1; 2], step: [1.0; 2] };
     let potential =
-        ScalarField::new(grid, vec![0.0; grid.sample_count()], Interpolation::Linear).unwrap();
+        ScalarField::potential(grid, vec![0.0; grid.sample_count()], Interpolation::Linear)
+            .unwrap();
     let weight = ImageWeight::constant(0.0).unwrap();
     let distance = NominalDistance::constant(&grid, d).unwrap();
+    let fields = FieldsView { potential: &potential, weight: &weight, distance: &distance };
     let (mut energy_squared, mut gradient_squared, mut variables) = (0.0, 0.0, 0.0);
     const RUNS: u64 = 12;
     for seed in 0..RUNS {
@@ -354,7 +317,7 @@ fn sampling_errors(d: f64) -> (f64, f64) {
         let n = atoms.len();
         let mut wanted = vec![[0.0; 2]; n];
         let direct = direct_energy(&atoms, &vec![d; n], &vec![0.0; n], &potential, &mut wanted);
-        let mut engine = SampledEngine::new(&potential, &weight, &distance);
+        let mut engine = SampledEngine::new(fields);
         engine.prepare(&atoms, 0.1);
         let (energy, gradient) = evaluate(&mut engine, &atoms);
         energy_squared += ((energy.total() - direct.total()) / n as f64).powi(2);
@@ -368,7 +331,7 @@ fn sampling_errors(d: f64) -> (f64, f64) {
 
 /// Atoms move to their nearest samples, by up to half a sample: φ and its slope, functions of r/d, then
 /// err by something proportional to 1/d, at random. In the energy of many atoms these cancel in part,
-/// since their mean is 0; what is left of second order in 1/d does not.
+/// since their mean is 0; the rest, of second order in 1/d, does not.
 #[test]
 fn what_the_sampled_engine_errs_by_halves_when_d_doubles() {
     let errors = [4.0, 8.0, 16.0].map(sampling_errors);

@@ -3,7 +3,7 @@
 //! Atoms are put in an order in which eight that follow each other are near each other: the set is
 //! halved across its longest side, and the halves again, at multiples of eight. Eight atoms make a
 //! block, eight blocks a group, eight groups one of the next level, each with its bounding box: nothing
-//! else is stored, and a tree over atoms that have moved a little is made anew in one pass over them.
+//! else is stored, and a tree over atoms that have moved a little is rebuilt in one pass.
 //! Boxes fit the atoms' density wherever they are, so the cost of a search does not grow with
 //! d_max/d_min.
 //!
@@ -39,7 +39,7 @@ impl<const D: usize> Boxes<D> {
         let (mut gap_squared, mut reach_squared) = ([0.0f32; LANES], [0.0f32; LANES]);
         for l in 0..LANES {
             for k in 0..D {
-                // compared by hand: f32::max minds NaN, which costs as much again
+                // compared by hand: f32::max handles NaN, which doubles the cost
                 let below = self.low[k][l] - target.high[k];
                 let above = target.low[k] - self.high[k][l];
                 let gap = if below > above { below } else { above };
@@ -158,7 +158,7 @@ const ROUNDING: f64 = 1e-6;
 
 impl<const D: usize> Scaling<D> {
     pub fn new(bounds: &Bounds<D>) -> Self {
-        let longest = bounds.extent().into_iter().fold(0.0, f64::max);
+        let longest = bounds.longest_edge();
         let scale = if longest > 0.0 { 1.0 / longest } else { 1.0 };
         Self { origin: bounds.min, scale }
     }
@@ -184,7 +184,7 @@ pub(super) struct Tree<const D: usize> {
 }
 
 impl<const D: usize> Tree<D> {
-    /// Makes the tree anew: `atom` gives the place and half reach of each atom in the tree's order.
+    /// Rebuilds the tree: `atom` gives the place and half reach of each atom in the tree's order.
     pub fn build(&mut self, count: usize, atom: impl Fn(usize) -> ([f32; D], f32) + Sync) {
         let nowhere = Block { at: [[f32::INFINITY; LANES]; D], reach: [0.0; LANES] };
         self.blocks.resize(count.div_ceil(LANES), nowhere);

@@ -1,22 +1,45 @@
 //! The interfaces of a label image as valleys of one depth and width.
 //!
-//! With m the share of a label around a place (a Gaussian over where the label is), 1 − Σ m² is 0 within a
-//! label and ½ on a straight interface of two: twice that, clipped to 1, is the valley, whatever numbers the
-//! labels have. Each label is smoothed in its own box, and the largest not at all: its share is what the
-//! others leave.
+//! With m the share of a label around a place (a Gaussian over the label's samples), 1 − Σ m² is 0 within a
+//! label and ½ on a straight interface of two. Twice that, clipped to 1, is the valley, whatever numbers the
+//! labels have. Each label is smoothed in its own box, and the largest not at all: its share is the rest.
 
 use std::collections::HashMap;
 
-use crate::image::{Grid, gaussian};
+use crate::image::{Grid, Image, gaussian};
 use crate::watch::{Phase, Watch, check};
 
-use super::EnhanceError;
+use super::{EnhanceError, Enhanced, FeatureOptions};
 
 /// Where a Gaussian ends, in standard deviations.
 const REACH: f64 = 4.0;
 
 /// The most samples in the boxes of all labels, over the image's: grey values lie all over it.
 const MOST_BOXES: f64 = 500.0;
+
+/// The potential of a label image: valleys of one depth where labels meet.
+pub(super) fn labelled<const D: usize>(
+    image: &Image<D>,
+    options: &FeatureOptions,
+    watch: &mut dyn Watch,
+) -> Result<Enhanced, EnhanceError> {
+    let grid = image.frame().grid(options.units);
+    let labels = image.samples().to_f32();
+    let sigma = grid.step.map(|step| (options.edge_scale * grid.least_step() / step).max(0.7));
+    let valleys = interfaces(&labels, &grid, sigma, watch)?;
+    let constant = valleys.is_none();
+    let mut values = valleys.unwrap_or_else(|| vec![0.0; labels.len()]);
+    let sign = if options.repel { 1.0 } else { -1.0 };
+    let sigma = options.sigma(&grid);
+    let turn = |part: &mut [f32]| part.iter_mut().for_each(|b| *b = *b * sign + 0.0);
+    turn(&mut values);
+    if sigma[0] > 0.0 {
+        gaussian(&mut values, grid.shape, sigma);
+        values.iter_mut().for_each(|b| *b = b.clamp(-1.0, 1.0));
+    }
+    check(watch, Phase::Potential, 1.0, None)?;
+    Ok(Enhanced { values, constant })
+}
 
 /// A label's samples: how many, and the box that holds them.
 struct Extent<const D: usize> {
@@ -65,9 +88,8 @@ fn extents<const D: usize>(labels: &[f32], grid: &Grid<D>) -> Vec<Extent<D>> {
     found
 }
 
-/// The valleys, 0…1, of interfaces smoothed by `sigma` samples along each axis; `None` if there is but one
-/// label.
-pub(super) fn interfaces<const D: usize>(
+/// The valleys, 0…1, of interfaces smoothed by `sigma` samples along each axis; `None` if there is only one label.
+fn interfaces<const D: usize>(
     labels: &[f32],
     grid: &Grid<D>,
     sigma: [f64; D],
@@ -85,54 +107,65 @@ pub(super) fn interfaces<const D: usize>(
         return Ok(None);
     }
     let largest = (0..extents.len()).max_by_key(|&i| (extents[i].count, std::cmp::Reverse(i)));
-    // Σ m and Σ m² of all labels but the largest
-    let (mut sum, mut squares) = (vec![0.0_f32; labels.len()], vec![0.0_f32; labels.len()]);
+    // of all labels but the largest
+    let mut sums = ShareSums { first: vec![0.0; labels.len()], squares: vec![0.0; labels.len()] };
     for (i, extent) in extents.iter().enumerate().filter(|(i, _)| Some(*i) != largest) {
         check(watch, Phase::Potential, 0.1 + 0.6 * i as f64 / extents.len() as f64, None)?;
-        add_share(extent, labels, grid, sigma, (&mut sum, &mut squares));
+        sums.add(extent, labels, grid, sigma);
     }
-    for (square, sum) in squares.iter_mut().zip(&sum) {
+    let ShareSums { first, mut squares } = sums;
+    for (square, sum) in squares.iter_mut().zip(&first) {
         let rest = 1.0 - sum;
         *square = (2.0 * (1.0 - *square - rest * rest)).clamp(0.0, 1.0);
     }
     Ok(Some(squares))
 }
 
-/// Adds a label's share, and its square, in the box that the share reaches.
-fn add_share<const D: usize>(
-    extent: &Extent<D>,
-    labels: &[f32],
-    grid: &Grid<D>,
-    sigma: [f64; D],
-    (sum, squares): (&mut [f32], &mut [f32]),
-) {
-    let reach = sigma.map(|s| (REACH * s).ceil() as usize + 1);
-    let low: [usize; D] = std::array::from_fn(|k| extent.low[k].saturating_sub(reach[k]));
-    let high: [usize; D] =
-        std::array::from_fn(|k| (extent.high[k] + reach[k]).min(grid.shape[k] - 1));
-    let shape: [usize; D] = std::array::from_fn(|k| high[k] + 1 - low[k]);
-    let strides = grid.strides();
-    let row_start = |row: usize| {
-        let (mut rest, mut start) = (row, low[0]);
-        for k in 1..D {
-            start += (low[k] + rest % shape[k]) * strides[k];
-            rest /= shape[k];
+/// Sums over labels at every sample.
+struct ShareSums {
+    /// Σ m.
+    first: Vec<f32>,
+    /// Σ m².
+    squares: Vec<f32>,
+}
+
+impl ShareSums {
+    /// Adds a label's share in the box that the share reaches.
+    fn add<const D: usize>(
+        &mut self,
+        extent: &Extent<D>,
+        labels: &[f32],
+        grid: &Grid<D>,
+        sigma: [f64; D],
+    ) {
+        let reach = sigma.map(|s| (REACH * s).ceil() as usize + 1);
+        let low: [usize; D] = std::array::from_fn(|k| extent.low[k].saturating_sub(reach[k]));
+        let high: [usize; D] =
+            std::array::from_fn(|k| (extent.high[k] + reach[k]).min(grid.shape[k] - 1));
+        let shape: [usize; D] = std::array::from_fn(|k| high[k] + 1 - low[k]);
+        let strides = grid.strides();
+        let row_start = |row: usize| {
+            let (mut rest, mut start) = (row, low[0]);
+            for k in 1..D {
+                start += (low[k] + rest % shape[k]) * strides[k];
+                rest /= shape[k];
+            }
+            start
+        };
+        let rows: usize = shape[1..].iter().product();
+        let mut share = Vec::with_capacity(rows * shape[0]);
+        for row in 0..rows {
+            let start = row_start(row);
+            let is_label = |&v: &f32| if v == extent.value { 1.0 } else { 0.0 };
+            share.extend(labels[start..start + shape[0]].iter().map(is_label));
         }
-        start
-    };
-    let rows: usize = shape[1..].iter().product();
-    let mut share = Vec::with_capacity(rows * shape[0]);
-    for row in 0..rows {
-        let start = row_start(row);
-        let is_label = |&v: &f32| if v == extent.value { 1.0 } else { 0.0 };
-        share.extend(labels[start..start + shape[0]].iter().map(is_label));
-    }
-    gaussian(&mut share, shape, sigma);
-    for (row, shares) in share.chunks_exact(shape[0]).enumerate() {
-        let start = row_start(row);
-        for (i, m) in shares.iter().enumerate() {
-            sum[start + i] += m;
-            squares[start + i] += m * m;
+        gaussian(&mut share, shape, sigma);
+        for (row, shares) in share.chunks_exact(shape[0]).enumerate() {
+            let start = row_start(row);
+            for (i, m) in shares.iter().enumerate() {
+                self.first[start + i] += m;
+                self.squares[start + i] += m * m;
+            }
         }
     }
 }

@@ -12,13 +12,13 @@ use crate::watch::Watch;
 pub struct Share {
     /// The kind.
     pub features: Features,
-    /// How deep its valleys are in the mixture, above 0, at most 1.
+    /// The depth of its valleys in the mixture, above 0, at most 1.
     pub weight: f64,
 }
 
-/// Kinds of features and their weights, spelt `faults:1,horizons:0.5`; a weight of 1 may be left out.
+/// Kinds of features and their weights, as in `faults:1,horizons:0.5`; a weight of 1 may be left out.
 ///
-/// There is one kind at least, and none twice.
+/// There is at least one kind, and none is given twice.
 ///
 /// ```
 /// use atomesh::enhance::Mixture;
@@ -32,11 +32,11 @@ pub struct Share {
 #[serde(into = "String", try_from = "String")]
 pub struct Mixture(Vec<Share>);
 
-/// Why a text is no mixture.
+/// Why a text is not a mixture.
 #[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
 #[non_exhaustive]
 pub enum MixtureError {
-    /// A kind that is not known.
+    /// An unknown kind.
     #[error("{name:?} is no kind of features; expected one of {}", Features::NAMES.join(", "))]
     Kind {
         /// The name found.
@@ -78,7 +78,7 @@ impl Mixture {
         &self.0
     }
 
-    /// The kind, if it is one alone, with its weight of 1.
+    /// The kind, if there is only one, of weight 1.
     pub fn single(&self) -> Option<Features> {
         match self.0[..] {
             [Share { features, weight: 1.0 }] => Some(features),
@@ -133,14 +133,14 @@ impl fmt::Display for Mixture {
     }
 }
 
-/// Makes one potential of several kinds of features: wherever the deepest valley is, its depth times the weight of
-/// its kind counts. `image_of` gives the image of each kind: one for labels, one for all others, of the same shape.
+/// Makes one potential of several kinds of features: at each sample the deepest of their valleys, each scaled by the
+/// weight of its kind. `image_of` gives the image of each kind: one for labels, one for all others, of the same shape.
 ///
 /// Where features of two kinds meet, the potential is that of the stronger, not the sum, so that it stays within
 /// −1…0 (0…1 if it repels) and crossings do not gather atoms.
 ///
 /// # Errors
-/// As [`enhance`], by which each kind is found with these options, its own kind put in.
+/// As [`enhance`], which finds each kind by these options.
 pub fn enhance_mixture<'a, const D: usize>(
     mixture: &Mixture,
     options: &FeatureOptions,
@@ -148,7 +148,7 @@ pub fn enhance_mixture<'a, const D: usize>(
     watch: &mut dyn Watch,
 ) -> Result<Enhanced, EnhanceError> {
     let mut all: Option<Enhanced> = None;
-    // without its noise, once for all kinds but labels
+    // the denoised image, for all kinds but labels
     let mut clean: Option<Image<D>> = None;
     for Share { features, weight } in &mixture.0 {
         let mut options = FeatureOptions { features: *features, ..*options };

@@ -1,9 +1,8 @@
 //! Exact order statistics in O(N), without sorting or copying.
 //!
-//! Small integers are counted value by value, in one pass. The bits of real numbers above 0 are in the
-//! numbers' own order: one pass counts their upper halves, which finds the half of the value wanted; a
-//! second counts the lower halves beneath it. Counts are whole numbers, so that threads may add them up in
-//! any order.
+//! Small integers are counted value by value, in one pass. The bits of real numbers above 0, read as integers, are in
+//! the order of the numbers. One pass counts their upper halves, which finds that of the value wanted; a second counts
+//! the lower halves of the values with that upper half. Counts are integers, so that threads may add them in any order.
 
 use rayon::prelude::*;
 
@@ -13,7 +12,7 @@ const BLOCK: usize = 1 << 14;
 /// Samples counted by one thread before counts are added up.
 const PART: usize = 1 << 20;
 
-/// A value by its place in the order, and how many samples are on either side.
+/// A value of a certain rank, and how many samples are on either side of it.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(super) struct Ranked {
     pub(super) value: f32,
@@ -23,7 +22,7 @@ pub(super) struct Ranked {
     pub(super) above: usize,
 }
 
-/// Samples that can be asked for their order.
+/// Samples whose order is known.
 pub(super) trait Ranks {
     /// The sample with `rank` others before it in ascending order. Ranks beyond the last are the
     /// last; 0 without samples.
@@ -45,7 +44,7 @@ impl Levels {
     ) -> Self {
         let empty = || vec![0u64; values.len()];
         let count_part = |mut counts: Vec<u64>, part: &[T]| {
-            // two counts in turn: one after the other of the same level would wait for each other
+            // two counts in turn: successive additions to one count would wait for each other
             let mut others = vec![0u64; values.len()];
             for pair in part.chunks(2) {
                 counts[level(pair[0]) as usize] += 1;
@@ -69,7 +68,7 @@ impl Ranks for Levels {
     }
 }
 
-/// The samples, none negative, that `fill(start, out)` writes, ready to be asked for their order.
+/// The order of the samples, none negative, that `fill(start, out)` writes.
 pub(super) struct Order<F> {
     count: usize,
     fill: F,
@@ -129,7 +128,7 @@ fn histogram(
                 // + 0.0 turns −0 into 0, whose bits are in order
                 let bits = (*value + 0.0).to_bits();
                 if bits == 0 {
-                    zeros += 1; // there may be many in a row, and one would wait for another
+                    zeros += 1; // there may be many in a row, each waiting for the one before
                 } else if let Some(bin) = bin(bits) {
                     bins[bin as usize] += 1;
                 }

@@ -1,17 +1,23 @@
 //! Scaling of samples: where the background is, and where a full feature.
 
-use super::EnhanceError;
+use super::edges::edges;
 use super::quantile::{Levels, Order, Ranks};
-use crate::image::Samples;
+use super::{EnhanceError, Enhanced, FeatureOptions, Features};
+use crate::image::{Image, Samples, gaussian_between};
+use crate::watch::{Phase, Watch, check};
+use rayon::prelude::*;
 
 /// Of the samples darker (brighter) than the background, the share that is clipped to −1.
 const CLIPPED_FEATURES: f64 = 0.02;
 
-/// An image's samples, moved and scaled to 0…1 as they are read, so that neither their offset nor
+/// Samples that one task maps.
+const BLOCK: usize = 1 << 16;
+
+/// An image's samples, moved and scaled to 0…1 while they are read, so that neither their offset nor
 /// their size meets the limits of single precision.
 pub(super) struct UnitSamples<'a> {
     samples: &'a Samples,
-    /// Half the least sample and half the range: halves, lest the range overflows.
+    /// Half the least sample, and half the range: the whole might overflow.
     half_min: f64,
     half_range: f64,
     scale: f64,
@@ -19,12 +25,12 @@ pub(super) struct UnitSamples<'a> {
     levels: Vec<f32>,
 }
 
-/// The place of a signed byte among them, the least first.
+/// The place of a signed byte among all of them, in ascending order.
 fn signed_place(s: i8) -> u8 {
     s as u8 ^ 0x80
 }
 
-/// The same of a signed 16-bit integer.
+/// The same for a signed 16-bit integer.
 fn signed_place_16(s: i16) -> u16 {
     s as u16 ^ 0x8000
 }
@@ -136,4 +142,49 @@ impl Ramp {
             *v = sign * (-(*v - self.background) / depth).clamp(-1.0, 0.0) + 0.0;
         }
     }
+}
+
+/// The potential of dark or bright places, or of gradients: straight lines of the samples, clipped and smoothed.
+pub(super) fn scaled<const D: usize>(
+    unit: &UnitSamples,
+    image: &Image<D>,
+    options: &FeatureOptions,
+    watch: &mut dyn Watch,
+) -> Result<Enhanced, EnhanceError> {
+    let zeros = || vec![0.0; unit.len()];
+    let shown = match options.features {
+        Features::None => None,
+        _ if unit.is_constant() => None,
+        Features::Dark => Some((zeros(), Ramp::dark(unit))),
+        Features::Bright => Some((zeros(), Ramp::bright(unit))),
+        _ => edges(unit, image, options, watch)?,
+    };
+    check(watch, Phase::Potential, 0.8, None)?;
+    let constant = shown.is_none() && options.features != Features::None;
+    let Some((mut values, ramp)) = shown else {
+        return Ok(Enhanced { values: zeros(), constant });
+    };
+    let sign = if options.repel { -1.0 } else { 1.0 };
+    let scale = |start, part: &mut [f32]| {
+        if options.features != Features::Edges {
+            unit.fill(start, part);
+        }
+        ramp.apply(part, sign);
+    };
+    let (least, greatest) = if options.repel { (0.0, 1.0) } else { (-1.0, 0.0) };
+    let clip = |part: &mut [f32]| {
+        for b in part {
+            *b = b.clamp(least, greatest) + 0.0; // rounding may leave the range; no −0
+        }
+    };
+    let grid = image.frame().grid(options.units);
+    let sigma = options.sigma(&grid);
+    if sigma[0] > 0.0 {
+        gaussian_between(&mut values, grid.shape, sigma, scale, clip);
+    } else {
+        let parts = values.par_chunks_mut(BLOCK).enumerate();
+        parts.for_each(|(block, part)| scale(block * BLOCK, part));
+    }
+    check(watch, Phase::Potential, 1.0, None)?;
+    Ok(Enhanced { values, constant })
 }

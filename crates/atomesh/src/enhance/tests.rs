@@ -1,6 +1,7 @@
 use super::*;
 use crate::image::Frame;
-use crate::watch::Silent;
+use crate::image::Units;
+use crate::watch::{Cancelled, Silent};
 use std::ops::ControlFlow;
 
 fn image<const D: usize>(shape: [usize; D], samples: Samples) -> Image<D> {

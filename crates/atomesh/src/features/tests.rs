@@ -256,7 +256,7 @@ fn facets_in_a_valley_are_found_by_b_between_samples_and_missed_by_points() {
     let b = |x: usize| if x == 2 || x == 4 { -1.0 } else { 0.0 };
     let image = (0..81).map(|i| b(i % 9)).collect();
     let grid = Grid { shape: [9, 9], step: [1.0; 2] };
-    let potential = ScalarField::new(grid, image, Interpolation::Linear).unwrap();
+    let potential = ScalarField::potential(grid, image, Interpolation::Linear).unwrap();
     let field = FacetField::along(&mesh, &potential, &mut Silent).unwrap();
     let found = find_features(&mesh, &field, &FeatureFacetOptions { below: -0.8, ..KEEP }).unwrap();
     let on_walls = found.report(&mesh);

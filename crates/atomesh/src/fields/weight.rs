@@ -1,9 +1,9 @@
 //! The weight β(x) of the image against regularity.
 
-use crate::geometry::Point;
+use crate::geometry::{Bounds, Point};
 use crate::image::Grid;
 
-use super::scalar::{FieldError, Interpolation, ScalarField};
+use super::{FieldError, Interpolation, ScalarField};
 
 /// The weight β(x) of the image against regularity, in 0…1.
 ///
@@ -35,13 +35,18 @@ impl<const D: usize> ImageWeight<D> {
         if let Some(i) = samples.iter().position(|w| !(0.0..=1.0).contains(w)) {
             return Err(FieldError::Weight { index: Some(i), value: f64::from(samples[i]) });
         }
-        let field = ScalarField::new(grid, samples, Interpolation::Linear)?;
+        let field = ScalarField::unchecked(grid, samples, Interpolation::Linear)?;
         Ok(Self { constant: 0.0, field: Some(field) })
     }
 
     /// β at a lattice point.
     pub fn at(&self, p: &Point<D>) -> f64 {
         self.field.as_ref().map_or(self.constant, |field| field.value(p))
+    }
+
+    /// The box of the samples; `None` if β is the same everywhere.
+    pub(super) fn bounds(&self) -> Option<Bounds<D>> {
+        self.field.as_ref().map(|field| field.grid().bounds())
     }
 
     /// β, where it is the same everywhere.

@@ -7,12 +7,12 @@ use rayon::prelude::*;
 /// it on are near each other, and so are eight such blocks, and eight of those: the set is halved across
 /// its longest side, at a power of two of blocks, and the halves again.
 ///
-/// Blocks are more compact than those of [`super::hilbert_order`]: what is looked for by boxes is found sooner.
+/// Blocks are more compact than those of [`super::hilbert_order`]: a search by boxes is faster.
 /// Points equal along an axis go by index. Coordinates are compared in single precision, in units of the
 /// points' extent. Cost: O(n log n).
 pub fn compact_order<const D: usize>(points: &[Point<D>]) -> Vec<u32> {
     let Some(bounds) = Bounds::of(points) else { return Vec::new() };
-    let longest = bounds.extent().into_iter().fold(0.0, f64::max);
+    let longest = bounds.longest_edge();
     let scale = if longest > 0.0 { 1.0 / longest } else { 1.0 };
     let mut entries: Vec<Entry<D>> = points
         .par_iter()

@@ -1,7 +1,7 @@
 //! Points, bounds, simplices, exact predicates and space-filling order.
 //!
 //! Conventions of the whole library: axis 0 is x and the fastest in memory; orientation is positive
-//! counter-clockwise with axis 1 up (in 3-D: right-handed); a sample's value sits at its centre.
+//! counter-clockwise with axis 1 up (in space: right-handed); a sample's value sits at its centre.
 //! *Lattice coordinates* are sample indices times the grid's step (see [`crate::image::Grid`]), so
 //! sample 0 is at 0 and the box reaches to `(n − 1) · step`.
 
@@ -13,6 +13,7 @@ mod predicates;
 mod sets;
 mod simplex;
 pub use bounds::Bounds;
+pub(crate) use bounds::{all_axes, axes_where};
 pub use compact::{BLOCK, compact_order};
 pub(crate) use order::shares;
 pub use order::{hilbert_order, lexicographic};

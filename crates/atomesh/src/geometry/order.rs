@@ -1,4 +1,4 @@
-//! Points along a Hilbert curve: what is near in memory is then near in space.
+//! Points along a Hilbert curve: those near in memory are then near each other.
 //!
 //! The bounding cube of the points is cut into 2^b cells a side and the cells are numbered along the
 //! curve (Hamilton 2006). Points of one cell follow each other in order of their coordinates, equal
@@ -9,7 +9,7 @@ use super::{Bounds, Point};
 use rayon::prelude::*;
 use std::cmp::Ordering;
 
-/// The bits of a whole key: 30 a coordinate in 2-D, 20 in 3-D.
+/// The bits of a whole key: 30 a coordinate in the plane, 20 in space.
 const KEY_BITS: usize = 60;
 
 /// The indices of `points` in the order in which a Hilbert curve through their bounding cube meets
@@ -20,7 +20,7 @@ const KEY_BITS: usize = 60;
 pub fn hilbert_order<const D: usize>(points: &[Point<D>]) -> Vec<u32> {
     let Some(bounds) = Bounds::of(points) else { return Vec::new() };
     let bits = KEY_BITS / D;
-    let side = bounds.extent().into_iter().fold(0.0, f64::max);
+    let side = bounds.longest_edge();
     let cells = (1_u64 << bits) as f64;
     let curve = HilbertCurve::<D>::new();
     let keyed: Vec<(u64, u32)> = points
@@ -297,7 +297,7 @@ mod tests {
         };
         let points: Vec<Point<3>> = (0..5000).map(|_| [next(), next() * 0.1, 3.0]).collect();
         let bounds = Bounds::of(&points).unwrap();
-        let side = bounds.extent().into_iter().fold(0.0, f64::max);
+        let side = bounds.longest_edge();
         let cells = (1_u64 << (KEY_BITS / 3)) as f64;
         let curve = HilbertCurve::<3>::new();
         let key = |i: &u32| {

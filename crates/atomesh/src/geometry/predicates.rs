@@ -7,11 +7,11 @@
 use super::{Point, simplex::Simplex};
 use robust::{Coord, Coord3D, incircle, insphere, orient2d, orient3d};
 
-fn flat<const D: usize>(p: &Point<D>) -> Coord<f64> {
+fn planar<const D: usize>(p: &Point<D>) -> Coord<f64> {
     Coord { x: p[0], y: p[1] }
 }
 
-fn solid<const D: usize>(p: &Point<D>) -> Coord3D<f64> {
+fn spatial<const D: usize>(p: &Point<D>) -> Coord3D<f64> {
     Coord3D { x: p[0], y: p[1], z: p[2] }
 }
 
@@ -20,10 +20,10 @@ pub(super) fn orientation<const D: usize>(simplex: &Simplex<D>) -> f64 {
     const { assert!(D == 2 || D == 3) };
     let (a, o) = (&simplex.first, &simplex.others);
     if D == 2 {
-        orient2d(flat(a), flat(&o[0]), flat(&o[1]))
+        orient2d(planar(a), planar(&o[0]), planar(&o[1]))
     } else {
         // Shewchuk's sign is that of a left-handed tetrahedron.
-        -orient3d(solid(a), solid(&o[0]), solid(&o[1]), solid(&o[2]))
+        -orient3d(spatial(a), spatial(&o[0]), spatial(&o[1]), spatial(&o[2]))
     }
 }
 
@@ -32,8 +32,8 @@ pub(super) fn in_sphere<const D: usize>(simplex: &Simplex<D>, p: &Point<D>) -> f
     const { assert!(D == 2 || D == 3) };
     let (a, o) = (&simplex.first, &simplex.others);
     if D == 2 {
-        incircle(flat(a), flat(&o[0]), flat(&o[1]), flat(p))
+        incircle(planar(a), planar(&o[0]), planar(&o[1]), planar(p))
     } else {
-        -insphere(solid(a), solid(&o[0]), solid(&o[1]), solid(&o[2]), solid(p))
+        -insphere(spatial(a), spatial(&o[0]), spatial(&o[1]), spatial(&o[2]), spatial(p))
     }
 }

@@ -2,7 +2,7 @@
 
 use super::{Point, difference, predicates};
 
-/// The simplex of `D + 1` points: a triangle in 2-D, a tetrahedron in 3-D.
+/// The simplex of `D + 1` points: a triangle in the plane, a tetrahedron in space.
 ///
 /// One corner stands apart because `D + 1` cannot be written in a type.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -14,7 +14,7 @@ pub struct Simplex<const D: usize> {
 }
 
 impl<const D: usize> Simplex<D> {
-    /// The signed area (2-D) or volume (3-D): the determinant of the edges from the first corner
+    /// The signed area (plane) or volume (space): the determinant of the edges from the first corner
     /// over D!, positive for positive orientation. Rounded: see [`Simplex::orientation`] for a sign
     /// to trust.
     pub fn measure(&self) -> f64 {
@@ -25,7 +25,7 @@ impl<const D: usize> Simplex<D> {
     }
 
     /// The exact orientation: above 0 if positive, below 0 if negative, 0 if the corners lie on one
-    /// line (2-D) or plane (3-D).
+    /// line (plane) or plane (space).
     pub fn orientation(&self) -> f64 {
         predicates::orientation(self)
     }

@@ -1,11 +1,10 @@
-//! Averages over cells: what a wide Gaussian has smoothed, held as coarsely as it may be.
+//! Averages over cells: an image smoothed by a wide Gaussian, held as coarsely as it may be.
 //!
-//! What a Gaussian of standard deviation σ has smoothed need not be held at every sample. Cells are at
+//! An image smoothed by a Gaussian of standard deviation σ need not be held at every sample. Cells are at
 //! most σ/3 wide and divide each axis evenly, so that they end where the image ends and mirrored
-//! samples are mirrored cells; with σ = 12 a volume has a 64th as many cells as samples, and smoothing
-//! them takes next to no time. Samples are averaged over cells as they stream by, the averages
-//! smoothed by what is left of σ, and read by linear interpolation; the variances of cells and of
-//! interpolation are taken off σ².
+//! samples are mirrored cells. With σ = 12 a volume has a 64th as many cells as samples, and smoothing
+//! them takes next to no time. Samples are averaged over cells as they stream by. The averages are smoothed by a
+//! narrower Gaussian, and read by linear interpolation; the variances of cells and of interpolation are taken off σ².
 //!
 //! Cost: a few additions per sample and entry.
 
@@ -18,10 +17,10 @@ use std::ops::Range;
 /// Cells per standard deviation of the smoothing.
 const CELLS_PER_SIGMA: f64 = 3.0;
 
-/// The variance, in squared widths, of a cell and of what is linear between cells: 1/12 + 1/6.
+/// The variance, in squared widths, of a cell and of linear interpolation between cells: 1/12 + 1/6.
 const CELL_VARIANCE: f64 = 0.25;
 
-/// Samples between two looks at whether to go on: a fraction of a second's work.
+/// Samples between two looks at the watch: a fraction of a second's work.
 const BATCH_SAMPLES: usize = 1 << 24;
 
 /// Some numbers per sample, smoothed and held per cell.
@@ -34,18 +33,18 @@ pub(crate) struct CellAverages<const D: usize> {
     entries: Vec<Vec<f32>>,
 }
 
-/// What of a stream is averaged: `count` numbers a sample.
+/// The numbers of each sample of a stream that are averaged.
 pub(crate) trait Entries<const D: usize>: Sync {
-    /// How many numbers.
+    /// How many numbers a sample has.
     fn count(&self) -> usize;
 
-    /// Writes number `entry` of samples, of which the smoothed values and slopes are given.
+    /// Writes number `entry` of the samples with these smoothed values and slopes.
     fn write(&self, entry: usize, average: &[f32], slopes: [&[f32]; D], out: &mut [f32]);
 }
 
 impl<const D: usize> CellAverages<D> {
-    /// The averages of what `entries` makes of a stream over an image of a shape without empty axes, smoothed by
-    /// Gaussians of standard deviations `smooth`, in samples; 0 leaves an axis alone.
+    /// The averages of the numbers that `entries` makes of a stream, smoothed by Gaussians of standard deviations
+    /// `smooth`, in samples; 0 leaves an axis alone. No axis of `shape` is empty.
     ///
     /// # Errors
     /// [`Cancelled`] if the watch ends the work.
@@ -69,7 +68,7 @@ impl<const D: usize> CellAverages<D> {
         Ok(averages)
     }
 
-    /// What is left of the smoothing, in cells.
+    /// The standard deviation of the rest of the smoothing, in cells.
     fn cell_sigma(&self, smooth: [f64; D]) -> [f64; D] {
         std::array::from_fn(|k| {
             let width = self.shape[k] as f64 / self.cells[k] as f64;
@@ -111,9 +110,7 @@ impl<const D: usize> CellAverages<D> {
         Ok(())
     }
 
-    /// The cells that the samples of one row, along the first axis, are between.
-    ///
-    /// The row is that of a sample, whose place along the first axis does not matter.
+    /// The cells around a sample's row along the first axis.
     pub(crate) fn row(&self, sample: [usize; D]) -> CellRow<'_, D> {
         let mut corners = [(0, 1.0f32); 4];
         let (mut count, mut stride) = (1, self.cells[0]);
@@ -132,7 +129,7 @@ impl<const D: usize> CellAverages<D> {
     }
 }
 
-/// The cells that a row of samples is between.
+/// The cells around a row of samples.
 pub(crate) struct CellRow<'a, const D: usize> {
     averages: &'a CellAverages<D>,
     /// Where rows of cells begin, and their weights.
@@ -150,7 +147,7 @@ impl<const D: usize> CellRow<'_, D> {
         }
     }
 
-    /// Between which two cells, by number, sample `x` is, and the share of the second.
+    /// The numbers of the two cells around sample `x`, and the share of the second.
     pub(crate) fn place(&self, x: usize) -> (usize, usize, f32) {
         let m = self.averages.cells[0];
         let (cell, share) = place(x, self.averages.shape[0], m);
@@ -169,14 +166,14 @@ impl<const D: usize> CellRow<'_, D> {
     }
 }
 
-/// What is at a share of the way from one value to another.
+/// The value at a share of the way from one to another.
 #[inline]
 pub(crate) fn between(here: f32, next: f32, share: f32) -> f32 {
     here + (next - here) * share
 }
 
-/// The cell whose middle is before sample `i` of `n`, of `m` cells, and how far the sample is on the way to the
-/// next. Samples beyond the outer middles are at these.
+/// The cell, of `m`, whose middle is before sample `i` of `n`, and the sample's share of the way to the next middle.
+/// Samples beyond the outer middles are taken to be there.
 fn place(i: usize, n: usize, m: usize) -> (usize, f32) {
     // in half cells, lest the cell's middle is rounded
     let place = ((2 * i + 1) * m) as f32 / (2 * n) as f32 - 0.5;
@@ -234,7 +231,7 @@ impl<'a, 'b, const D: usize> Sums<'a, 'b, D> {
         Self { shares, cells, layers, parts, open, spare, numbers, row }
     }
 
-    /// Adds a run of a plane of so many samples.
+    /// Adds a run of samples; `plane` is how many a plane has.
     fn add(&mut self, run: &Run<D>, plane: usize, entries: &impl Entries<D>) {
         let layer: usize = self.cells[..D - 1].iter().product();
         let mut sums = match self.open.iter().position(|(open, _)| *open == run.plane) {

@@ -2,6 +2,8 @@
 
 use crate::geometry::{Bounds, Point};
 
+use super::place::coordinates;
+
 /// Which coordinates the lattice lives in.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, serde::Serialize, serde::Deserialize)]
 #[serde(rename_all = "lowercase")]
@@ -40,7 +42,7 @@ pub enum FrameError {
         /// The coordinate found.
         value: f64,
     },
-    /// The direction's columns are not unit vectors at right angles.
+    /// The columns of a direction are not unit vectors at right angles.
     #[error("direction {direction:?} is not made of unit vectors at right angles")]
     Direction {
         /// The matrix found, row by row.
@@ -99,6 +101,18 @@ impl<const D: usize> Grid<D> {
             stride *= self.shape[k];
             s
         })
+    }
+
+    /// The lattice coordinates of a sample.
+    #[inline]
+    pub fn position(&self, index: usize) -> Point<D> {
+        let sample = coordinates(index, self.shape);
+        std::array::from_fn(|k| sample[k] as f64 * self.step[k])
+    }
+
+    /// A length in samples, by the geometric mean of the steps where these differ.
+    pub fn in_samples(&self, length: f64) -> f64 {
+        length / self.step.iter().product::<f64>().powf(1.0 / D as f64)
     }
 
     /// The smallest step of all axes.

@@ -6,7 +6,8 @@
 //!
 //! Cost: O(σ) per sample and axis.
 
-use super::convolve::{Kernel, convolve, convolve_between};
+use super::convolve::{convolve, convolve_between};
+use super::kernel::Kernel;
 
 /// Where kernels end, in standard deviations.
 const TRUNCATE: f64 = 4.0;
@@ -28,8 +29,8 @@ pub fn gaussian<const D: usize>(values: &mut [f32], shape: [usize; D], sigma: [f
     convolve(values, shape, &kernels(shape, sigma, [0; D]));
 }
 
-/// [`gaussian`] where `before(start, part)` makes the samples from index `start` on before they are
-/// smoothed, and `after(part)` may change them when they are: large images come from memory less often.
+/// [`gaussian`], where `before(start, part)` makes the samples from index `start` on just before they are
+/// smoothed, and `after(part)` may change them just after: large images are read from memory less often.
 pub(crate) fn gaussian_between<const D: usize>(
     values: &mut [f32],
     shape: [usize; D],

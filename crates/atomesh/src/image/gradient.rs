@@ -1,14 +1,13 @@
 //! The magnitude of an image's gradient, by Prewitt's operator or by derivatives of Gaussians.
 //!
-//! The image is streamed, so that there is no copy of it beside it and the result, and it may stay in the
-//! type of its file.
+//! The image is streamed: it stays in the type of its file, and no copy of it is made.
 
 use super::stream::{Stencil, Stream};
 use super::{Grid, Samples};
 use crate::watch::Cancelled;
 use rayon::prelude::*;
 
-/// Samples between two looks at whether to go on: a fraction of a second's work.
+/// Samples between two looks at the watch: a fraction of a second's work.
 const BATCH_SAMPLES: usize = 1 << 25;
 
 /// The magnitude of the gradient by Prewitt's operator, in sample values per lattice unit.
@@ -27,10 +26,9 @@ pub fn prewitt_magnitude<const D: usize>(samples: &Samples, grid: &Grid<D>) -> V
 /// The magnitude of the gradient of the smoothed image, in sample values per lattice unit.
 ///
 /// Derivatives of a Gaussian of standard deviation `sigma`, in least steps of the grid, as of
-/// [`gaussian_derivative`](super::gaussian_derivative), each over its axis' step. The Gaussian is as wide
-/// in lattice units along every axis, so that edges of all directions are alike, but for coarse axes,
-/// along which it is not narrower than 0.7 samples. Below 0.5 or so a
-/// Gaussian is narrower than the samples are apart, and slopes come out too small; below 1/8 it
+/// [`gaussian_derivative`](super::gaussian_derivative), each over its axis' step. The Gaussian has one width
+/// in lattice units, so that edges of all directions are alike, but along coarse axes it is at least 0.7 samples wide.
+/// Below σ = 0.5 or so a Gaussian is narrower than the samples are apart, and slopes come out too small; below 1/8 it
 /// reaches no neighbour, and they are 0.
 ///
 /// # Panics
@@ -57,10 +55,10 @@ fn plain_magnitude<const D: usize>(
 
 /// The magnitude of the gradient of the samples that `fill(start, out)` writes.
 ///
-/// `go_on` is asked now and then, with the share done.
+/// `go_on` is called now and then with the share done.
 ///
 /// # Errors
-/// What `go_on` answers.
+/// Those of `go_on`.
 pub(crate) fn magnitude<const D: usize>(
     fill: impl Fn(usize, &mut [f32]) + Sync,
     grid: &Grid<D>,

@@ -5,6 +5,7 @@ mod convolve;
 mod frame;
 mod gaussian;
 mod gradient;
+mod kernel;
 mod place;
 mod samples;
 mod stream;

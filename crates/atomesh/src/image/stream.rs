@@ -1,24 +1,24 @@
 //! Averages and slopes of an image, plane by plane, in one pass over the samples.
 //!
 //! The operators are separable: along one axis a slope, along the others an average. The image is
-//! streamed along its last axis: a plane that comes in is weighted within the plane, axis by axis, what
-//! components share once for all of them, and kept in a ring, from which the planes that have become
-//! complete are weighted along the last axis. So the memory is 3 r D planes a thread, of a kernel that
-//! reaches r samples, and nobody need hold a gradient of the whole image.
+//! streamed along its last axis. A plane that comes in is weighted within the plane, axis by axis, sums that components
+//! share only once, and kept in a ring. Planes whose neighbours are all in the ring are weighted along the last axis. So
+//! the memory is 3 r D planes a thread, r being the kernel's reach in samples, and no gradient of the whole image is held.
 //!
-//! Where all samples that count are 0, as about a scanned head, so is the slope: such rows are passed over.
+//! Where all samples within reach are 0, as about a scanned head, so is the slope: such rows are skipped.
 
 use super::Grid;
-use super::convolve::{Kernel, KernelPair, mirrored};
+use super::convolve::mirrored;
 use super::gaussian::kernel;
+use super::kernel::{Kernel, KernelPair};
 use std::ops::Range;
 
-/// Columns weighted at once along the last axis: 1 KiB a plane, so that the planes of a ring stay in
-/// the second-level cache meanwhile.
+/// Columns weighted at once along the last axis: 1 KiB a plane, so that all planes of a ring stay in
+/// the second-level cache.
 const CHUNK: usize = 256;
 
-/// A Gaussian is not made narrower than this many samples along an axis that is coarser than others: at
-/// 0.7 the slope of a ramp is still right to 0.6 %.
+/// The least width of a Gaussian, in samples, along an axis that is coarser than others: at 0.7 the slope of a ramp is
+/// still right to 0.6 %.
 const NARROWEST: f64 = 0.7;
 
 /// How slopes are taken.
@@ -31,8 +31,7 @@ pub(crate) enum Stencil {
 }
 
 impl Stencil {
-    /// The kernels along an axis of `n` samples, `ratio` times as far apart as those of the finest axis:
-    /// average, slope per sample.
+    /// The average, and the slope per sample, along an axis of `n` samples, whose step is `ratio` least steps.
     fn kernels(self, n: usize, ratio: f64) -> KernelPair {
         match self {
             Stencil::Prewitt => KernelPair {
@@ -47,13 +46,13 @@ impl Stencil {
     }
 }
 
-/// What the smoothed image is along a run of samples of one plane.
+/// The smoothed image along a run of samples of one plane.
 pub(crate) struct Run<'a, const D: usize> {
     /// The plane, counted along the last axis.
     pub(crate) plane: usize,
     /// The place of the first sample in its plane.
     pub(crate) column: usize,
-    /// The smoothed samples; zeros unless the stream was asked for them.
+    /// The smoothed samples; zeros unless the stream is [`Stream::with_smoothed`].
     pub(crate) average: &'a [f32],
     /// Their slopes along each axis, per lattice unit.
     pub(crate) slopes: [&'a [f32]; D],
@@ -73,8 +72,8 @@ pub(crate) struct Stream<F, const D: usize> {
     smoothed: bool,
 }
 
-/// The planes that one task works on: `D` of a kind, the last of which holds averages alone, the one
-/// before those with a slope along the last axis but one, and so on.
+/// The planes that one task works on: `D` of a kind. The last holds averages alone, the one before those with a slope
+/// along the last axis but one, and so on.
 struct Planes<const D: usize> {
     /// Weighted along the axes so far.
     done: [Vec<f32>; D],
@@ -85,12 +84,12 @@ struct Planes<const D: usize> {
 }
 
 /// A plane kept in the ring, and which chunks of it are 0 throughout.
-struct Slot {
+struct RingPlane {
     values: Vec<f32>,
     blank: Vec<bool>,
 }
 
-impl Slot {
+impl RingPlane {
     /// Takes a plane in exchange for the one that is no longer needed.
     fn take(&mut self, plane: &mut Vec<f32>) {
         std::mem::swap(&mut self.values, plane);
@@ -112,7 +111,7 @@ impl<F: Fn(usize, &mut [f32]) + Sync, const D: usize> Stream<F, D> {
         Self { fill, shape: grid.shape, plane, kernels, radius, smoothed: false }
     }
 
-    /// The same that also gives smoothed samples.
+    /// The same pass, with smoothed samples beside their slopes.
     pub(crate) fn with_smoothed(self) -> Self {
         Self { smoothed: true, ..self }
     }
@@ -122,13 +121,12 @@ impl<F: Fn(usize, &mut [f32]) + Sync, const D: usize> Stream<F, D> {
         self.plane
     }
 
-    /// How many planes one task should run through at least, since it has as many as the kernel is long
-    /// to read before its first.
+    /// The fewest planes worth a task: before its first it has to read as many as the kernel is long.
     pub(crate) fn least_planes(&self) -> usize {
         (4 * self.radius).max(1)
     }
 
-    /// Planes weighted along the last axis at once, so that the ring is read from memory few times.
+    /// Planes weighted along the last axis at once: more of them read the ring from memory less often.
     fn group(&self) -> usize {
         self.radius.max(1)
     }
@@ -138,14 +136,13 @@ impl<F: Fn(usize, &mut [f32]) + Sync, const D: usize> Stream<F, D> {
         2 * self.radius + self.group()
     }
 
-    /// Shows `visit` all samples of the planes from `first` to `last`, the latter excluded.
-    ///
-    /// Each sample once; those of one plane in their order, the planes' ends in order too.
+    /// Shows `visit` all samples of some planes, each once. Those of a plane come in their order, and planes end in
+    /// their order.
     pub(crate) fn run(&self, planes: Range<usize>, visit: &mut impl FnMut(&Run<D>)) {
         let (first, count) = (planes.start, planes.len());
         let empty = || vec![0.0; self.plane];
-        let slot = || Slot { values: empty(), blank: vec![true; self.plane.div_ceil(CHUNK)] };
-        let mut ring: [Vec<Slot>; D] =
+        let slot = || RingPlane { values: empty(), blank: vec![true; self.plane.div_ceil(CHUNK)] };
+        let mut ring: [Vec<RingPlane>; D] =
             std::array::from_fn(|_| (0..self.depth()).map(|_| slot()).collect());
         let empties = || std::array::from_fn(|_| empty());
         let mut planes = Planes { done: empties(), next: empties(), row: Vec::new() };
@@ -210,7 +207,7 @@ impl<F: Fn(usize, &mut [f32]) + Sync, const D: usize> Stream<F, D> {
     }
 
     /// Weighs a part of `planes.next` across lines of `inner` samples into the same part of
-    /// `planes.done`: slopes along earlier axes are averaged, of the averages the slope is taken too.
+    /// `planes.done`: slopes along earlier axes are averaged; averages are averaged, and give the slope along this axis.
     fn weigh_across(&self, axis: usize, part: Range<usize>, inner: usize, planes: &mut Planes<D>) {
         let pair = &self.kernels[axis];
         let Planes { done, next, .. } = planes;
@@ -239,11 +236,11 @@ impl<F: Fn(usize, &mut [f32]) + Sync, const D: usize> Stream<F, D> {
         }
     }
 
-    /// Weighs a chunk of columns along the last axis, for all planes of a group, the first of which is that
-    /// many after plane `first`; it needs the arrivals from its own number on.
+    /// Weighs a chunk of columns along the last axis, for all planes of a group. Its planes are counted from plane
+    /// `first`; each needs the arrivals from its own number on.
     fn combine(
         &self,
-        ring: &[Vec<Slot>; D],
+        ring: &[Vec<RingPlane>; D],
         first: usize,
         group: Range<usize>,
         column: usize,
@@ -300,7 +297,7 @@ impl<'a> Lines<'a> {
         Self { blank: lines.iter().map(|line| is_blank(line)).collect(), lines }
     }
 
-    /// The `count` lines from `first` on; `None` if they are all 0, and so whatever is made of them.
+    /// The `count` lines from `first` on; `None` if they are all 0, and so is any sum of them.
     fn around(&self, first: usize, count: usize) -> Option<&[&'a [f32]]> {
         let within = first..first + count;
         let blank = self.blank[within.clone()].iter().all(|&blank| blank);

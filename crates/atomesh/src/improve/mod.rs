@@ -1,21 +1,21 @@
 //! Improving a mesh after its points are connected: facets turn onto features, and no cell stays flat.
 //!
-//! Delaunay's rule knows the atoms and not the image. Where two atoms on a feature are not joined, or a
-//! tetrahedron has four corners near one plane, swaps and small moves do what the rule cannot: swaps lower the
+//! Delaunay's rule knows the atoms but not the image. Where two atoms on a feature are not joined, or a
+//! tetrahedron has four corners near one plane, swaps and small moves do what the rule cannot. Swaps lower the
 //! mean of b along facets (Hale 2001 names them in section 2.4), moves lower the energy of facets and of shape
-//! together, and neither takes a cell below a floor on its least angle that the mesh had kept so far.
+//! together. There is a floor on the least angle of a cell: cells above it stay above it.
 //!
-//! [`Improver`] is the contract; each dimension has its own. Points without freedom stay, others stay on the side
-//! of the box that they lie on. In the plane, points that move freely may be taken away where they crowd, and
-//! added where they are missing.
+//! [`Improver`] is the contract: [`PlaneImprover`] improves triangles, [`SpaceImprover`] tetrahedra. Points without
+//! freedom stay, others stay on the side of the box that they lie on. In the plane, points that move freely may be
+//! taken away where they crowd, and added where they are missing; in space they may be merged.
 
 mod plane;
 mod space;
 
 pub use plane::PlaneImprover;
-pub use space::Space;
+pub use space::SpaceImprover;
 
-use crate::fields::Fields;
+use crate::fields::FieldsView;
 use crate::mesh::{Mesh, MeshError};
 use crate::watch::{Cancelled, Watch};
 
@@ -27,8 +27,7 @@ pub enum Align {
     Off,
     /// Swaps alone; points stay.
     Swaps,
-    /// Swaps and moves; points go where they crowd and come where they are missing, if the dimension's
-    /// improver can.
+    /// Swaps and moves. Points may also be taken away, and in the plane added.
     #[default]
     Full,
 }
@@ -37,15 +36,16 @@ pub enum Align {
 #[derive(Clone, Debug, PartialEq, serde::Serialize, serde::Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct ImproveOptions {
-    /// Which means are used.
+    /// What is done.
     pub align: Align,
-    /// The floor on the least angle of a cell, in degrees: the interior angle in 2-D, the dihedral angle in
-    /// 3-D. Cells above it are kept above it; cells below it are raised as far as they go.
+    /// The floor on the least angle of a cell, in degrees: the interior angle in the plane, from 0 to below 60, the
+    /// dihedral angle in space, from 0 to below 70.5. Cells above it are kept above it; cells below it are raised as
+    /// far as possible.
     pub min_angle: f64,
 }
 
 impl ImproveOptions {
-    /// The defaults for images of a dimension: a floor of 20° in 2-D, of 15° in 3-D.
+    /// The defaults for images of a dimension: a floor of 20° in the plane, of 15° in space.
     pub fn for_dimension(dimension: usize) -> Self {
         Self { align: Align::default(), min_angle: if dimension == 2 { 20.0 } else { 15.0 } }
     }
@@ -68,7 +68,7 @@ impl ImproveOptions {
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]
 #[non_exhaustive]
 pub enum ImproveError {
-    /// The floor is no angle that cells could keep.
+    /// The floor is out of range.
     #[error("the least angle is {value} degrees; expected {expected}")]
     MinAngle {
         /// The floor asked for.
@@ -76,7 +76,7 @@ pub enum ImproveError {
         /// What it should be.
         expected: &'static str,
     },
-    /// The result was no mesh.
+    /// The result is not a mesh.
     #[error(transparent)]
     Mesh(#[from] MeshError),
     /// The caller ended the work.
@@ -104,15 +104,15 @@ pub struct ImproveReport {
     pub angle_after: f64,
     /// Cells whose least angle is still below the floor.
     pub below: usize,
-    /// Whether every cell keeps the floor; else nothing that was tried helped more.
+    /// Whether every cell keeps the floor.
     pub floor_held: bool,
 }
 
 /// Improves meshes of one dimension.
 pub trait Improver<const D: usize>: Sync {
-    /// The mesh with its cells swapped and its points moved. Bit k of `freedom` of a point: it may move along
-    /// axis k. Points keep their order, without those taken away; added points follow. The result is the same
-    /// at any thread count.
+    /// The mesh with its cells swapped and its points moved, and what was done. Bit k of a point's `freedom` lets it
+    /// move along axis k. Points keep their order, without those taken away; added points follow. The result is the
+    /// same at any thread count.
     ///
     /// # Errors
     /// [`ImproveError`] if the floor is out of range or the work was cancelled.
@@ -120,7 +120,7 @@ pub trait Improver<const D: usize>: Sync {
         &self,
         mesh: Mesh<D>,
         freedom: &[u8],
-        fields: Fields<'_, D>,
+        fields: FieldsView<'_, D>,
         options: &ImproveOptions,
         watch: &mut dyn Watch,
     ) -> Result<(Mesh<D>, ImproveReport), ImproveError>;

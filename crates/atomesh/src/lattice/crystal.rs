@@ -6,11 +6,11 @@ use crate::geometry::Point;
 #[derive(Clone, Copy, Debug, PartialEq, Eq, serde::Serialize, serde::Deserialize)]
 #[serde(rename_all = "lowercase")]
 pub enum CrystalKind {
-    /// Equilateral triangles, 6 neighbours; 2-D.
+    /// Equilateral triangles, 6 neighbours; in the plane.
     Hexagonal,
-    /// Face-centred cubic, 12 neighbours; 3-D, the paper's.
+    /// Face-centred cubic, 12 neighbours; in space, the paper's.
     Fcc,
-    /// Body-centred cubic, 8 neighbours; 3-D, the default.
+    /// Body-centred cubic, 8 neighbours; in space, the default.
     Bcc,
 }
 
@@ -46,7 +46,7 @@ impl Crystal<2> {
 }
 
 impl Crystal<3> {
-    /// The face-centred cubic crystal: 12 neighbours at distance 1 (the paper's, for 3-D).
+    /// The face-centred cubic crystal: 12 neighbours at distance 1 (the paper's, for space).
     pub fn face_centered_cubic() -> Self {
         let a = 0.5f64.sqrt();
         let mut neighbors = Vec::with_capacity(12);
@@ -83,7 +83,7 @@ impl<const D: usize> Crystal<D> {
         &self.neighbors
     }
 
-    /// Atoms in a unit of area (2-D) or volume (3-D), for a nominal distance of 1.
+    /// Atoms in a unit of area (plane) or volume (space), for a nominal distance of 1.
     pub fn density(&self) -> f64 {
         self.density
     }

@@ -43,7 +43,7 @@ pub(super) enum Look {
 
 const NONE: u32 = u32::MAX;
 
-/// Bounds are widened by this share, lest a rounding hides a ball.
+/// Bounds are widened by this share, so that no rounding hides a ball.
 const SLACK: f64 = 1e-6;
 
 #[derive(Clone, Copy)]
@@ -224,6 +224,15 @@ impl<const D: usize> Level<D> {
             row += self.strides[k];
         }
     }
+}
+
+/// Where growth starts again from the boundary, a site must be this far from other atoms, over d: holes in a
+/// crystal are smaller, so that where growth has passed little is added.
+const RESTART: f64 = 0.85;
+
+/// The diameter, over d, of the ball that must be free for an atom to be added from the boundary.
+pub(super) fn restart_room(gamma: f64) -> f64 {
+    (2.0 * RESTART - gamma).max(gamma)
 }
 
 #[cfg(test)]

@@ -1,8 +1,8 @@
 //! A random lattice: atoms without a preferred direction (Hale 2002).
 //!
 //! Starts from the boundary and one random point, then inserts circumcentres of simplices, those of the
-//! largest r/d first, until every circumradius r is within a limit of d: 0.760 in 2-D, 0.803 in 3-D.
-//! Edges of the box are divided evenly and, in 3-D, faces are scattered as planes of their own first.
+//! largest r/d first, until every circumradius r is within a limit of d: 0.760 in the plane, 0.803 in space.
+//! Edges of the box are divided evenly and, in space, faces are scattered as planes of their own first.
 //!
 //! Departure: atoms are inserted in rounds, each a Delaunay mesh of all atoms so far and, from the
 //! largest r/d down, every circumcentre far enough from those before it. The end is the same, and so is
@@ -14,13 +14,13 @@ use rayon::prelude::*;
 
 use crate::fields::NominalDistance;
 use crate::geometry::linear::solve;
-use crate::geometry::{Bounds, Point, difference, distance_squared, dot};
+use crate::geometry::{Bounds, Point, all_axes, difference, distance_squared, dot};
 use crate::mesh::{ConnectError, Delaunay, Mesh};
 use crate::watch::{Phase, Watch, check};
 
-use super::Lattice;
-use super::grow::{Boundary, LatticeError, Place};
+use super::boundary::{Boundary, Place};
 use super::occupancy::Occupancy;
+use super::{Lattice, LatticeError};
 
 /// What differs between dimensions: how to connect, and the limit of r/d.
 #[derive(Clone, Debug)]
@@ -104,20 +104,19 @@ pub fn scatter<const D: usize>(
     let mut lattice = Boundary::new(Place { bounds, distance, outline: None })?
         .plant_and_divide(&options.seed_points, &[])?;
     if D == 3 {
-        for face in 0..6 {
-            let random = Some(&mut random);
-            fill_face(&mut lattice, face / 2, face % 2 == 1, distance, ROUND_LIMIT, random, watch)?;
+        for side in 0..6 {
+            let face = Face { side, rounds: ROUND_LIMIT, random: Some(&mut random) };
+            fill_face(&mut lattice, face, distance, watch)?;
         }
     }
     let spread =
         Spread { delaunay: &scatterer.delaunay, limit: scatterer.limit, rounds: ROUND_LIMIT };
-    let all = ((1usize << D) - 1) as u8;
     let field = |p: &Point<D>| distance.at(p);
     let mut atoms = lattice.atoms().to_vec();
     start(&mut atoms, &bounds, &field, &mut random);
     spread.complete(&mut atoms, &bounds, &field, watch)?;
     for p in atoms.split_off(lattice.len()) {
-        lattice.push(p, all, 1.0);
+        lattice.push(p, all_axes::<D>(), 1.0);
     }
     Ok(lattice)
 }
@@ -138,8 +137,8 @@ pub fn fill_holes<const D: usize>(
     watch: &mut dyn Watch,
 ) -> Result<Lattice<D>, LatticeError> {
     if D == 3 {
-        for face in 0..6 {
-            fill_face(&mut lattice, face / 2, face % 2 == 1, distance, rounds, None, watch)?;
+        for side in 0..6 {
+            fill_face(&mut lattice, Face { side, rounds, random: None }, distance, watch)?;
         }
     }
     let spread = Spread { delaunay: &scatterer.delaunay, limit: scatterer.limit, rounds };
@@ -147,25 +146,32 @@ pub fn fill_holes<const D: usize>(
     let mut atoms = lattice.atoms().to_vec();
     spread.complete(&mut atoms, lattice.bounds(), &field, watch)?;
     for p in atoms.split_off(lattice.len()) {
-        lattice.push(p, ((1usize << D) - 1) as u8, 1.0);
+        lattice.push(p, all_axes::<D>(), 1.0);
     }
     Ok(lattice)
 }
 
-/// Adds atoms to one face of a box in 3-D, as a plane of its own; with random numbers, one at random
-/// first.
+/// A side of a box in space, and how atoms are added there.
+struct Face<'r> {
+    side: usize,
+    /// The most meshes to look at.
+    rounds: usize,
+    /// Where the first atom comes from, if one is added at random.
+    random: Option<&'r mut Pcg64>,
+}
+
+/// Adds atoms to a side of the box, as a plane of its own.
 fn fill_face<const D: usize>(
     lattice: &mut Lattice<D>,
-    normal: usize,
-    far: bool,
+    face: Face<'_>,
     distance: &NominalDistance<D>,
-    rounds: usize,
-    random: Option<&mut Pcg64>,
     watch: &mut dyn Watch,
 ) -> Result<(), LatticeError> {
+    let Face { side, rounds, random } = face;
     let bounds = *lattice.bounds();
+    let normal = side / 2;
     let (a, b) = ((normal + 1) % D, (normal + 2) % D);
-    let level = if far { bounds.max[normal] } else { bounds.min[normal] };
+    let level = bounds.level(side);
     let lift = |p: &Point<2>| -> Point<D> {
         let mut q = [level; D];
         (q[a], q[b]) = (p[0], p[1]);
@@ -174,8 +180,8 @@ fn fill_face<const D: usize>(
     let rim: Vec<Point<2>> =
         lattice.atoms().iter().filter(|p| p[normal] == level).map(|p| [p[a], p[b]]).collect();
     let plane = Bounds { min: [bounds.min[a], bounds.min[b]], max: [bounds.max[a], bounds.max[b]] };
-    let flat = Scatterer::<2>::new();
-    let spread = Spread { delaunay: &flat.delaunay, limit: flat.limit, rounds };
+    let planar = Scatterer::<2>::new();
+    let spread = Spread { delaunay: &planar.delaunay, limit: planar.limit, rounds };
     let field = |p: &Point<2>| distance.at(&lift(p));
     let mut atoms = rim.clone();
     if let Some(random) = random {
@@ -292,8 +298,8 @@ impl<const D: usize> Spread<'_, D> {
     }
 }
 
-/// The centre and radius of the sphere through D + 1 points; `None` if rounding leaves it open, as they are flat
-/// or nearly so.
+/// The centre and radius of the sphere through D + 1 points; `None` if they are flat, or so nearly that
+/// rounding decides.
 fn circumsphere<'a, const D: usize>(
     mut corners: impl Iterator<Item = &'a Point<D>>,
 ) -> Option<(Point<D>, f64)> {
@@ -310,7 +316,7 @@ fn circumsphere<'a, const D: usize>(
     let offset = right.map(|[x]| x);
     let radius = dot(&offset, &offset).sqrt();
     let centre = std::array::from_fn(|k| first[k] + offset[k]);
-    // of cells that are nearly flat it may be anywhere, on another atom too
+    // the centre of a nearly flat cell may be anywhere, even on another atom
     let off = |row: &Point<D>| (distance_squared(row, &offset).sqrt() - radius).abs();
     let is_sound = rows.iter().map(off).fold(0.0, f64::max) <= 1e-6 * radius;
     (radius.is_finite() && is_sound).then_some((centre, radius))

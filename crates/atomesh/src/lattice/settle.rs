@@ -7,8 +7,7 @@
 
 use rayon::prelude::*;
 
-use super::grow::LatticeError;
-use super::{Lattice, Scatterer};
+use super::{Lattice, LatticeError, Scatterer};
 use crate::fields::NominalDistance;
 use crate::geometry::{Point, Simplex};
 use crate::watch::{Phase, Watch, check};
@@ -61,7 +60,7 @@ fn pull<const D: usize>(
     let centroid: Point<D> =
         std::array::from_fn(|k| (0..=D).map(|corner| at(corner)[k]).sum::<f64>() / (D + 1) as f64);
     let d = distance.at(&centroid);
-    // over the least d, lest a power overflows; a cell turned over by the last sweep has no say
+    // over the least d, since a power may overflow; an inverted cell has weight 0
     let weight = simplex.measure().max(0.0) / (d / distance.least()).powi(D as i32 + 1);
     (centroid, weight)
 }

@@ -19,16 +19,7 @@ fn constant<const D: usize>(grid: &Grid<D>, d: f64) -> NominalDistance<D> {
 
 /// d as a function of the place, its slope limited to 0.25.
 fn graded<const D: usize>(grid: &Grid<D>, d: impl Fn(&Point<D>) -> f64) -> NominalDistance<D> {
-    let field: Vec<f32> = (0..grid.sample_count())
-        .map(|mut i| {
-            let p = std::array::from_fn(|k| {
-                let index = i % grid.shape[k];
-                i /= grid.shape[k];
-                index as f64 * grid.step[k]
-            });
-            d(&p) as f32
-        })
-        .collect();
+    let field: Vec<f32> = (0..grid.sample_count()).map(|i| d(&grid.position(i)) as f32).collect();
     NominalDistance::from_field(grid, &field, 0.25).unwrap()
 }
 
@@ -68,9 +59,7 @@ fn assert_sound<const D: usize>(
             assert_eq!(lattice.mobility(i, k), f64::from(u8::from(free)), "{what}: {p:?} axis {k}");
         }
     }
-    for c in 0..1 << D {
-        let corner =
-            std::array::from_fn(|k| if c >> k & 1 == 1 { bounds.max[k] } else { bounds.min[k] });
+    for corner in bounds.corners() {
         let count = lattice.atoms().iter().filter(|p| **p == corner).count();
         assert_eq!(count, 1, "{what}: atoms in corner {corner:?}");
     }
@@ -98,7 +87,7 @@ fn near_pairs<const D: usize>(
 
 fn sides<const D: usize>(lattice: &Lattice<D>, i: usize) -> usize {
     let (p, bounds) = (&lattice.atoms()[i], lattice.bounds());
-    (0..D).filter(|&k| p[k] == bounds.min[k] || p[k] == bounds.max[k]).count()
+    bounds.held(p).count_ones() as usize
 }
 
 /// No two atoms nearer than γ times the mean of their d; atoms on edges of the box may be nearer to
@@ -567,4 +556,39 @@ fn a_lattice_too_large_to_count_is_refused_at_once() {
     let end =
         grow(&Crystal::hexagonal(), grid.bounds(), &distance, &GrowOptions::default(), &mut Silent);
     assert!(matches!(end, Err(LatticeError::TooMany { .. })));
+}
+
+#[test]
+fn atoms_of_ones_own_are_held_on_the_sides_of_the_box() {
+    let grid = grid([8, 7, 6]);
+    let given = grown(&Crystal::body_centered_cubic(), &grid, &constant(&grid, 2.0));
+    let lattice = Lattice::from_atoms(grid.bounds(), given.atoms().to_vec()).unwrap();
+    assert_sound(&lattice, &Delaunay::<3>::new(), &[], "own atoms");
+    assert!((0..lattice.len()).all(|i| lattice.temperature[i] == 1.0));
+}
+
+#[test]
+fn atoms_that_make_no_lattice_are_named() {
+    let bounds = Bounds { min: [0.0, 0.0], max: [8.0, 6.0] };
+    let corners: Vec<Point<2>> = bounds.corners().collect();
+    let with = |p: Point<2>| {
+        let atoms = corners.iter().copied().chain([p]).collect();
+        Lattice::from_atoms(bounds, atoms).map(|_| ()).map_err(|error| error.to_string())
+    };
+    assert_eq!(with([3.0, 2.0]), Ok(()));
+    let cases = [
+        ([3.0, f64::NAN], "coordinate y of atom 4 is NaN; expected a finite number"),
+        (
+            [9.0, 1.0],
+            "atom 4 at [9.0, 1.0] lies outside the box [0.0, 0.0] to [8.0, 6.0] (lattice coordinates)",
+        ),
+        ([8.0, -0.0], "atoms 1 and 4 are both at [8.0, 0.0]; expected one"),
+    ];
+    for (p, message) in cases {
+        assert_eq!(with(p), Err(message.to_string()));
+    }
+    let end = Lattice::from_atoms(bounds, corners[1..].to_vec());
+    assert_eq!(end.unwrap_err(), LatticeError::NoCorner { corner: vec![0.0, 0.0] });
+    let flat = Bounds { min: [0.0, 0.0], max: [8.0, 0.0] };
+    assert_eq!(Lattice::from_atoms(flat, corners).unwrap_err(), LatticeError::Thin { axis: 1 });
 }

@@ -11,7 +11,7 @@ use crate::watch::{Phase, Watch, check};
 use rand::{Rng, SeedableRng};
 use rayon::prelude::*;
 
-/// Feature points between two looks at the watch; a few hundredths of a second.
+/// Feature points between two looks at the watch: a few hundredths of a second.
 const POINTS_PER_STEP: usize = 1 << 13;
 
 /// How alignment is measured.
@@ -55,7 +55,7 @@ pub struct AlignmentReport {
     pub dist_mean_relative: Option<f64>,
     /// The 95th percentile as a share of d.
     pub dist_p95_relative: Option<f64>,
-    /// The other way round: what of the selected facets lies on features; `None` if it was not measured.
+    /// The share of selected facets that lies on features; `None` if it was not measured.
     #[serde(flatten)]
     pub selected: Option<PrecisionReport>,
 }
@@ -66,7 +66,7 @@ pub struct AlignmentReport {
 /// thread count. Cost: O(m log m) in facets and about O(log m) for each feature point.
 ///
 /// # Errors
-/// [`MeasureError`] if the mesh has no cells, the size is no length, or the watch ends the work.
+/// [`MeasureError`] if the mesh has no cells, the size is not a finite number above 0, or the watch ends the work.
 pub fn alignment<const D: usize>(
     mesh: &Mesh<D>,
     features: &[FeaturePoint<D>],
@@ -85,7 +85,7 @@ pub fn alignment<const D: usize>(
 /// as [`alignment`].
 ///
 /// # Errors
-/// [`MeasureError`] if the size is no length, or the watch ends the work.
+/// [`MeasureError`] if the size is not a finite number above 0, or the watch ends the work.
 pub fn alignment_of_faces<const D: usize>(
     mesh: &PolyMesh<D>,
     features: &[FeaturePoint<D>],

@@ -1,10 +1,12 @@
-//! How all angles and all edges of a mesh are spread, not only the least of each cell.
+//! The spread of all angles and edges of a mesh, not of the least angle of each cell alone.
 
 use super::MeasureError;
+use super::cell_shape::angle_between;
 use super::faces::faces;
+use super::features::check_size;
 use super::statistics::{Histogram, sum};
 use crate::geometry::linear::invert;
-use crate::geometry::{Point, distance_squared, dot};
+use crate::geometry::{Point, difference, distance_squared, dot};
 use crate::mesh::Mesh;
 use crate::watch::{Phase, Watch, check};
 use rayon::prelude::*;
@@ -13,7 +15,7 @@ use rayon::prelude::*;
 const ANGLE_WIDTH: f64 = 5.0;
 const EDGE_WIDTH: f64 = 0.1;
 
-/// How many bins there are: up to 180°, and up to 3 d and beyond.
+/// The number of bins: up to 180°, and up to 3 d and beyond.
 const ANGLE_BINS: usize = 36;
 const EDGE_BINS: usize = 30;
 
@@ -53,7 +55,7 @@ pub struct SpreadReport {
 /// ends. The same at any thread count.
 ///
 /// # Errors
-/// [`MeasureError`] if the mesh has no cells, a wanted distance is no length, or the watch ends the work.
+/// [`MeasureError`] if the mesh has no cells, a wanted distance is not a finite number above 0, or the watch ends the work.
 pub fn spread<const D: usize>(
     mesh: &Mesh<D>,
     size: WantedSize<'_>,
@@ -62,14 +64,13 @@ pub fn spread<const D: usize>(
     if mesh.cell_count() == 0 {
         return Err(MeasureError::NoCells { points: mesh.points().len() });
     }
-    super::features::check_size(size.mean)?;
+    check_size(size.mean)?;
     check(watch, Phase::Measure, 0.0, None)?;
     let angles: Vec<f64> = (mesh.corners().par_chunks_exact(D + 1))
         .flat_map_iter(|cell| {
             let first = mesh.points()[cell[0] as usize];
-            let edges = std::array::from_fn(|k| {
-                crate::geometry::difference(&mesh.points()[cell[k + 1] as usize], &first)
-            });
+            let edges =
+                std::array::from_fn(|k| difference(&mesh.points()[cell[k + 1] as usize], &first));
             angles(&edges)
         })
         .collect();
@@ -115,12 +116,7 @@ fn angles<const D: usize>(edges: &[Point<D>; D]) -> Vec<f64> {
     let mut angles = Vec::with_capacity(D * (D + 1) / 2);
     for (i, a) in units.iter().enumerate() {
         for b in &units[..i] {
-            let (mut plus, mut minus) = (0.0, 0.0);
-            for k in 0..D {
-                plus += (a[k] + b[k]).powi(2);
-                minus += (a[k] - b[k]).powi(2);
-            }
-            angles.push(2.0 * plus.sqrt().atan2(minus.sqrt()).to_degrees());
+            angles.push(angle_between(a, b));
         }
     }
     angles

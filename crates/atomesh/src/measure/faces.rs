@@ -4,14 +4,14 @@ use crate::mesh::Mesh;
 use rayon::prelude::*;
 use std::ops::Range;
 
-/// The most points whose faces are sought at once: so few faces are held more than once.
+/// The most points whose faces are sought at once, which limits how many faces are held twice.
 const MOST_POINTS: usize = 1 << 19;
 
 /// The distinct faces with `K` corners of all cells, corners ascending, in lexicographic order.
 ///
-/// `K = 2` gives the edges, `K = D` the facets (in 2-D the same). Every part of the points looks for the
-/// faces that it leads among all cells, and sorts those of one point at a time. Cost: O(n) in cells, of
-/// few cells a point.
+/// `K = 2` gives the edges, `K = D` the facets (in 2-D the same). The points are cut in parts. Each part looks among all
+/// cells for the faces whose least corner it holds, and sorts those of one point at a time. Cost: O(n) in cells, where
+/// few cells share a point.
 pub(super) fn faces<const D: usize, const K: usize>(mesh: &Mesh<D>) -> Vec<[u32; K]> {
     let count = mesh.points().len();
     let parts = count.div_ceil(MOST_POINTS).next_multiple_of(rayon::current_num_threads());

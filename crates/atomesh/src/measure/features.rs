@@ -52,7 +52,7 @@ pub fn features<const D: usize>(
     Ok(in_large_groups(bottoms(values, shape, &search, watch)?, shape, size))
 }
 
-/// Refuses a nominal distance that is no length.
+/// Refuses a nominal distance that is not a finite number above 0.
 pub(super) fn check_size(size: f64) -> Result<(), MeasureError> {
     if size.is_finite() && size > 0.0 { Ok(()) } else { Err(MeasureError::Size { value: size }) }
 }

@@ -12,24 +12,24 @@
 use super::MeasureError;
 use super::statistics::{Histogram, sum, sums};
 use crate::geometry::linear::invert;
-use crate::geometry::{Point, difference};
+use crate::geometry::{Point, difference, dot};
 use crate::image::{Frame, Image, Samples, Units};
 use crate::mesh::Mesh;
-use crate::sample::{SampleOptions, Statistic, sample, sample_placed};
+use crate::sample::{SampleOptions, Statistic, sample, sample_in_frame};
 use crate::watch::{Phase, Watch, check};
 use rayon::prelude::*;
 use std::sync::atomic::{AtomicU32, Ordering};
 
-/// Iterations of the conjugate gradients, at most; some 30 suffice, as the matrix is a mass matrix.
+/// The most iterations of the conjugate gradients; some 30 suffice, as the matrix is a mass matrix.
 const MOST_ITERATIONS: usize = 200;
 
-/// The share of the first residual at which they end: errors are right to its square.
+/// The residual at which the iterations end, over the first: errors are right to its square.
 const ENOUGH: f64 = 1e-6;
 
-/// How far outside a cell a sample may be to count as inside, in barycentric coordinates.
+/// The greatest distance outside a cell at which a sample counts as inside, in barycentric coordinates.
 const SLACK: f64 = 1e-9;
 
-/// How well the image can be rebuilt from the mesh. Errors are in the image's own unit.
+/// How well the image can be rebuilt from the mesh. Errors are in the unit of the image.
 #[derive(Clone, Debug, PartialEq, serde::Serialize)]
 #[non_exhaustive]
 pub struct FidelityReport {
@@ -41,17 +41,17 @@ pub struct FidelityReport {
     pub constant_rms: f64,
     /// RMS error of the continuous, linear least-squares fit.
     pub linear_rms: f64,
-    /// The first as a share of the deviation; `None` for a constant image.
+    /// `constant_rms` over the deviation; `None` for a constant image.
     pub constant_relative: Option<f64>,
-    /// The second as a share of the deviation.
+    /// `linear_rms` over the deviation; `None` for a constant image.
     pub linear_relative: Option<f64>,
     /// Iterations of the fit.
     pub iterations: usize,
-    /// Whether they ended by their own test.
+    /// Whether the fit converged within its limit of iterations.
     pub converged: bool,
 }
 
-/// How pure cells are: OOF's homogeneity.
+/// How much of one label cells are: OOF's homogeneity.
 #[derive(Clone, Debug, PartialEq, serde::Serialize)]
 #[non_exhaustive]
 pub struct HomogeneityReport {
@@ -64,7 +64,7 @@ pub struct HomogeneityReport {
     pub mixed: usize,
     /// Cells by that share, in 20 bins of 0.05.
     pub histogram: Histogram,
-    /// Cells without samples; they count nowhere else.
+    /// Cells without samples; nothing else counts them.
     pub without: usize,
 }
 
@@ -75,12 +75,13 @@ pub struct HomogeneityReport {
 /// the work.
 pub fn fidelity<const D: usize>(
     mesh: &Mesh<D>,
-    (frame, samples): (&Frame<D>, &Samples),
+    frame: &Frame<D>,
+    samples: &Samples,
     watch: &mut dyn Watch,
 ) -> Result<FidelityReport, MeasureError> {
     let none = MeasureError::NoCells { points: mesh.points().len() };
     let kinds = [Statistic::Mean, Statistic::Std];
-    let found = sample_placed(mesh, frame, samples, SampleOptions::new(&kinds), watch)?;
+    let found = sample_in_frame(mesh, frame, samples, SampleOptions::new(&kinds), watch)?;
     let [means, deviations] = [&found.values[0], &found.values[1]];
     let weight = |i: usize| found.measures[i] * found.coverage[i];
     let weighted = |i: usize, value: f64| if weight(i) > 0.0 { weight(i) * value } else { 0.0 };
@@ -116,7 +117,7 @@ pub fn fidelity<const D: usize>(
     })
 }
 
-/// Measures how pure the cells of a mesh in the world are by an image of labels.
+/// Measures how much of one label each cell is; the mesh is in world coordinates.
 ///
 /// # Errors
 /// [`MeasureError`] if the mesh has no cells with labels, the image holds no labels, or the watch ends the work.
@@ -176,9 +177,11 @@ impl<'a, const D: usize> System<'a, D> {
             (0..frame.sample_count()).into_par_iter().map(|_| AtomicU32::new(u32::MAX)).collect();
         let corners = mesh.corners().par_chunks_exact(D + 1).enumerate();
         corners.clone().for_each(|(cell, corners)| {
-            each_sample(&points, corners, shape, |index, _, _| {
-                owners[index].fetch_min(cell as u32, Ordering::Relaxed);
-            });
+            if let Some(inside) = CellSamples::new(&points, corners, shape) {
+                inside.each(|index, _, _| {
+                    owners[index].fetch_min(cell as u32, Ordering::Relaxed);
+                });
+            }
         });
         let width = D + 1;
         let mut matrices = vec![0.0; mesh.cell_count() * width * width];
@@ -188,7 +191,8 @@ impl<'a, const D: usize> System<'a, D> {
             .zip(rights.par_chunks_exact_mut(width))
             .map(|(((cell, corners), matrix), right)| {
                 let mut sums = [0.0; 2];
-                each_sample(&points, corners, shape, |index, shares, weight| {
+                let Some(inside) = CellSamples::new(&points, corners, shape) else { return sums };
+                inside.each(|index, shares, weight| {
                     let value = samples.get(index) - mean;
                     if owners[index].load(Ordering::Relaxed) != cell as u32 || !value.is_finite() {
                         return;
@@ -277,58 +281,81 @@ impl<'a, const D: usize> System<'a, D> {
     }
 }
 
-/// Calls `visit` with the index, the D + 1 barycentric coordinates and the box of each sample in a cell.
-fn each_sample<const D: usize>(
-    points: &[Point<D>],
-    corners: &[u32],
+/// The samples in a cell.
+struct CellSamples<const D: usize> {
+    /// The image's shape.
     shape: [usize; D],
-    mut visit: impl FnMut(usize, &[f64], f64),
-) {
-    let first = points[corners[0] as usize];
-    let edges: [Point<D>; D] =
-        std::array::from_fn(|k| difference(&points[corners[k + 1] as usize], &first));
-    let Some((inverse, _)) = invert(&edges) else { return };
-    let (mut low, mut counts) = ([0; D], [0; D]);
-    for k in 0..D {
-        let ends = corners.iter().map(|&c| points[c as usize][k]);
-        let (min, max) =
-            ends.fold((f64::INFINITY, f64::NEG_INFINITY), |(a, b), x| (a.min(x), b.max(x)));
-        let last = (shape[k] - 1) as f64;
-        if max < -SLACK || min > last + SLACK {
-            return;
+    /// The first sample of the cell's box, and how many there are along each axis.
+    low: [usize; D],
+    counts: [usize; D],
+    /// The cell's first corner.
+    first: Point<D>,
+    /// Gradients of the barycentric coordinates: D + 1 of them, D at most 4.
+    gradients: [Point<D>; 5],
+}
+
+impl<const D: usize> CellSamples<D> {
+    /// The samples of a cell, given by its corners, in an image of a shape; `None` if the cell is flat or its box holds
+    /// no sample.
+    fn new(points: &[Point<D>], corners: &[u32], shape: [usize; D]) -> Option<Self> {
+        let first = points[corners[0] as usize];
+        let edges: [Point<D>; D] =
+            std::array::from_fn(|k| difference(&points[corners[k + 1] as usize], &first));
+        let (inverse, _) = invert(&edges)?;
+        let (mut low, mut counts) = ([0; D], [0; D]);
+        for k in 0..D {
+            let ends = corners.iter().map(|&c| points[c as usize][k]);
+            let (min, max) =
+                ends.fold((f64::INFINITY, f64::NEG_INFINITY), |(a, b), x| (a.min(x), b.max(x)));
+            let last = (shape[k] - 1) as f64;
+            if max < -SLACK || min > last + SLACK {
+                return None;
+            }
+            low[k] = (min - SLACK).ceil().max(0.0) as usize;
+            let high = (max + SLACK).floor().min(last) as usize;
+            counts[k] = (high + 1).saturating_sub(low[k]);
         }
-        low[k] = (min - SLACK).ceil().max(0.0) as usize;
-        let high = (max + SLACK).floor().min(last) as usize;
-        counts[k] = (high + 1).saturating_sub(low[k]);
+        // column k of the inverse is the gradient of the barycentric coordinate of corner k + 1
+        let mut gradients = [[0.0; D]; 5];
+        for k in 0..D {
+            for r in 0..D {
+                gradients[k + 1][r] = inverse[r][k];
+                gradients[0][r] -= inverse[r][k];
+            }
+        }
+        (counts[0] > 0).then_some(Self { shape, low, counts, first, gradients })
     }
-    if counts[0] == 0 {
-        return;
-    }
-    // column k of the inverse is the gradient of the barycentric coordinate of corner k + 1
-    let mut gradients = [[0.0; D]; 5]; // D + 1 of them, D at most 4
-    for k in 0..D {
-        for r in 0..D {
-            gradients[k + 1][r] = inverse[r][k];
-            gradients[0][r] -= inverse[r][k];
+
+    /// Calls `visit` with the index, the D + 1 barycentric coordinates and the box of each sample.
+    fn each(&self, mut visit: impl FnMut(usize, &[f64], f64)) {
+        for row in 0..self.counts[1..].iter().product() {
+            let (mut rest, mut index, mut stride) = (row, self.low[0], self.shape[0]);
+            let mut weight = 1.0;
+            let mut offset = [self.low[0] as f64 - self.first[0]; D];
+            for k in 1..D {
+                let at = self.low[k] + rest % self.counts[k];
+                rest /= self.counts[k];
+                index += at * stride;
+                stride *= self.shape[k];
+                weight *= rim(at, self.shape[k]);
+                offset[k] = at as f64 - self.first[k];
+            }
+            self.each_of_row(&offset, |i, shares| {
+                visit(index + i, shares, weight * rim(self.low[0] + i, self.shape[0]));
+            });
         }
     }
-    for row in 0..counts[1..].iter().product() {
-        let (mut rest, mut index, mut stride, mut weight) = (row, low[0], shape[0], 1.0);
-        let mut offset = [low[0] as f64 - first[0]; D];
-        for k in 1..D {
-            let at = low[k] + rest % counts[k];
-            rest /= counts[k];
-            index += at * stride;
-            stride *= shape[k];
-            weight *= rim(at, shape[k]);
-            offset[k] = at as f64 - first[k];
-        }
+
+    /// Calls `visit` with the number and the barycentric coordinates of each sample of a row, the first of which is
+    /// `offset` from the cell's first corner.
+    #[inline(always)]
+    fn each_of_row(&self, offset: &Point<D>, mut visit: impl FnMut(usize, &[f64])) {
         // the coordinates at the row's first sample, and from where to where none is below 0
         let mut starts = [0.0; 5];
-        let (mut from, mut to) = (0.0_f64, (counts[0] - 1) as f64);
+        let (mut from, mut to) = (0.0_f64, (self.counts[0] - 1) as f64);
         for k in 0..=D {
-            starts[k] = f64::from(u8::from(k == 0)) + crate::geometry::dot(&offset, &gradients[k]);
-            let (start, slope) = (starts[k] + SLACK, gradients[k][0]);
+            starts[k] = f64::from(u8::from(k == 0)) + dot(offset, &self.gradients[k]);
+            let (start, slope) = (starts[k] + SLACK, self.gradients[k][0]);
             match slope {
                 s if s > 0.0 => from = from.max((-start / s).ceil()),
                 s if s < 0.0 => to = to.min((-start / s).floor()),
@@ -337,11 +364,12 @@ fn each_sample<const D: usize>(
             }
         }
         if from > to {
-            continue;
+            return;
         }
         for i in from as usize..=to as usize {
-            let shares: [f64; 5] = std::array::from_fn(|k| starts[k] + i as f64 * gradients[k][0]);
-            visit(index + i, &shares[..=D], weight * rim(low[0] + i, shape[0]));
+            let shares: [f64; 5] =
+                std::array::from_fn(|k| starts[k] + i as f64 * self.gradients[k][0]);
+            visit(i, &shares[..=D]);
         }
     }
 }

@@ -28,7 +28,7 @@ fn samples(shape: [usize; 2], value: impl Fn(&Point<2>) -> f64) -> (Frame<2>, Sa
 #[test]
 fn a_linear_image_is_carried_exactly_by_linear_cells() {
     let (frame, samples) = samples([25, 25], |p| 1e3 + 2.0 * p[0] - p[1]);
-    let report = fidelity(&squares(3, 8.0), (&frame, &samples), &mut Silent).unwrap();
+    let report = fidelity(&squares(3, 8.0), &frame, &samples, &mut Silent).unwrap();
     // values spread by some 16; the residual test leaves a share of 10⁻⁶ of the fit
     assert!(report.linear_rms < 1e-4, "{report:?}");
     assert!(report.converged && (report.covered - 1.0).abs() < 1e-12);
@@ -43,14 +43,21 @@ fn means_of_cells_leave_the_deviation_within_them() {
     // stripes of two columns, cells of whole squares of 8: each triangle half of either, nearly
     let (frame, samples) =
         samples([17, 17], |p| if ((p[0] / 2.0) as usize).is_multiple_of(2) { 1.0 } else { 3.0 });
-    let report = fidelity(&squares(2, 8.0), (&frame, &samples), &mut Silent).unwrap();
+    let report = fidelity(&squares(2, 8.0), &frame, &samples, &mut Silent).unwrap();
     assert!((report.deviation - 1.0).abs() < 0.01, "{report:?}");
     assert!((report.constant_rms - 1.0).abs() < 0.02 && report.linear_rms < report.deviation);
     // a constant image has no deviation to share
     let flat = Samples::U8(vec![7; 17 * 17]);
-    let report = fidelity(&squares(2, 8.0), (&frame, &flat), &mut Silent).unwrap();
+    let report = fidelity(&squares(2, 8.0), &frame, &flat, &mut Silent).unwrap();
     assert_eq!((report.deviation, report.constant_rms, report.linear_rms), (0.0, 0.0, 0.0));
     assert_eq!(report.constant_relative, None);
+}
+
+/// A sample of a fit.
+struct Weighted {
+    weight: f64,
+    basis: [f64; 3],
+    value: f64,
 }
 
 /// The least squares of one cell with the plane through its samples, by Cramer's rule.
@@ -59,7 +66,7 @@ fn the_fit_of_one_cell_is_the_plane_of_least_squares() {
     let value = |p: &Point<2>| (p[0] * 1.7).sin() + 0.3 * p[1] * p[1];
     let (frame, values) = samples([7, 7], value);
     let mesh = Mesh::new(vec![[0.0, 0.0], [6.0, 0.0], [0.0, 6.0]], vec![0, 1, 2]).unwrap();
-    let report = fidelity(&mesh, (&frame, &values), &mut Silent).unwrap();
+    let report = fidelity(&mesh, &frame, &values, &mut Silent).unwrap();
     let (mut a, mut b) = ([[0.0; 3]; 3], [[0.0; 1]; 3]);
     let mut used = Vec::new();
     for i in 0..49 {
@@ -73,14 +80,15 @@ fn the_fit_of_one_cell_is_the_plane_of_least_squares() {
                 }
                 b[r][0] += w * basis[r] * value(&p);
             }
-            used.push((w, basis, value(&p)));
+            used.push(Weighted { weight: w, basis, value: value(&p) });
         }
     }
     crate::geometry::linear::solve(3, a, &mut b);
-    let error = |(w, basis, v): &(f64, [f64; 3], f64)| {
-        w * (v - (0..3).map(|k| b[k][0] * basis[k]).sum::<f64>()).powi(2)
+    let error = |sample: &Weighted| {
+        let fitted = (0..3).map(|k| b[k][0] * sample.basis[k]).sum::<f64>();
+        sample.weight * (sample.value - fitted).powi(2)
     };
-    let expected = used.iter().map(error).sum::<f64>() / used.iter().map(|u| u.0).sum::<f64>();
+    let expected = used.iter().map(error).sum::<f64>() / used.iter().map(|u| u.weight).sum::<f64>();
     assert!((report.linear_rms - expected.sqrt()).abs() < 1e-9, "{report:?} {expected}");
 }
 
@@ -106,7 +114,7 @@ fn homogeneity_is_one_where_interfaces_are_facets() {
 fn what_covers_no_sample_or_holds_no_labels_is_refused() {
     let (frame, samples) = samples([9, 9], |p| p[0] * 0.5);
     let far = Mesh::new(vec![[20.0, 0.0], [28.0, 0.0], [20.0, 6.0]], vec![0, 1, 2]).unwrap();
-    let error = fidelity(&far, (&frame, &samples), &mut Silent);
+    let error = fidelity(&far, &frame, &samples, &mut Silent);
     assert_eq!(error, Err(MeasureError::NoCells { points: 3 }));
     let image = Image::new(frame, samples).unwrap();
     let error = homogeneity(&squares(1, 8.0), &image, &mut Silent);

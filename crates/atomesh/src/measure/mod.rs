@@ -1,11 +1,12 @@
 //! How good a mesh is: the shape of its cells, how well its facets follow the image, how well its cells carry it.
 //!
 //! Shape needs the mesh alone. Alignment compares it with *features*, the valleys of a potential
-//! b(x), found with sub-sample accuracy. Fidelity rebuilds the image from the mesh. All are reports, plain numbers for people and for JSON;
-//! neither changes anything. All of it is the same code in 2-D and 3-D.
+//! b(x), found with sub-sample accuracy. Fidelity rebuilds the image from the mesh. All give reports, plain numbers for
+//! people and for JSON, and change nothing. All of it is the same code in 2-D and 3-D.
 
 mod alignment;
 mod angles;
+mod cell_shape;
 mod faces;
 mod features;
 mod fidelity;
@@ -21,10 +22,11 @@ mod tests;
 
 pub use alignment::{AlignmentOptions, AlignmentReport, alignment, alignment_of_faces};
 pub use angles::{SpreadReport, WantedSize, spread};
+pub use cell_shape::{CellShape, cell_shape};
 pub use features::{SampledPotential, features};
 pub use fidelity::{FidelityReport, HomogeneityReport, fidelity, homogeneity};
 pub use precision::{PrecisionOptions, PrecisionReport, precision};
-pub use shape::{CellShape, ShapeReport, cell_shape, shape, shapes};
+pub use shape::{ShapeReport, shape, shapes};
 pub use statistics::Histogram;
 
 use crate::sample::SampleError;
@@ -34,13 +36,13 @@ use crate::watch::Cancelled;
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]
 #[non_exhaustive]
 pub enum MeasureError {
-    /// There is nothing to measure.
+    /// A mesh without cells.
     #[error("a mesh without cells has no shape; it holds {points} points")]
     NoCells {
         /// How many points the mesh holds.
         points: usize,
     },
-    /// The nominal distance cannot set the scale of features.
+    /// A nominal distance that is not a length.
     #[error("nominal distance {value} samples; expected a finite number above 0")]
     Size {
         /// The distance given, in samples.

@@ -1,8 +1,7 @@
 //! The facet nearest to a point, and whether one passes near it along a feature.
 //!
-//! A tree of boxes over the facets, halved at the median along the longest axis: exact, and as fast
-//! where the mesh is graded as where it is not. Facets are segments in 2-D and triangles in 3-D, here
-//! simply the simplices of D corners.
+//! A tree of boxes over the facets, halved at the median along the longest axis: exact, and as fast for a graded mesh as
+//! for a uniform one. Facets are segments in 2-D and triangles in 3-D: the simplices of D corners.
 
 use super::faces::faces;
 use crate::geometry::linear::solve;
@@ -10,13 +9,13 @@ use crate::geometry::{Bounds, Point, difference, dot};
 use crate::mesh::Mesh;
 use rayon::prelude::*;
 
-/// Facets in a leaf, at most.
+/// The most facets of a leaf.
 const LEAF: usize = 4;
 
-/// Facets from which on the parts of a tree are made side by side.
+/// The least number of facets whose two halves are built in parallel.
 const PARALLEL: usize = 1 << 10;
 
-/// A box and the facets in it: those of its two parts, the first of which follows at once.
+/// A box and the facets in it: those of its two parts. The first part is the next node.
 #[derive(Clone)]
 struct Node<const D: usize> {
     bounds: Bounds<D>,
@@ -26,7 +25,7 @@ struct Node<const D: usize> {
     second: usize,
 }
 
-/// What "near it along a feature" means.
+/// The limits within which a facet follows a feature.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Near {
     /// The greatest distance.
@@ -140,19 +139,14 @@ fn build<const D: usize>(
 ) {
     let mut bounds = bounds_of(&placed[0].facet.map(|c| points[c as usize]));
     for p in &placed[1..] {
-        let more = bounds_of(&p.facet.map(|c| points[c as usize]));
-        for k in 0..D {
-            bounds.min[k] = bounds.min[k].min(more.min[k]);
-            bounds.max[k] = bounds.max[k].max(more.max[k]);
-        }
+        bounds.join(&bounds_of(&p.facet.map(|c| points[c as usize])));
     }
     let end = start + placed.len();
     if placed.len() <= LEAF {
         nodes[0] = Node { bounds, start, end, second: 0 };
         return;
     }
-    let extent = bounds.extent();
-    let axis = (1..D).fold(0, |best, k| if extent[k] > extent[best] { k } else { best });
+    let axis = bounds.longest_axis();
     let half = placed.len() / 2;
     placed.select_nth_unstable_by(half, |a, b| a.middle[axis].total_cmp(&b.middle[axis]));
     let (first, second) = placed.split_at_mut(half);
@@ -174,12 +168,7 @@ fn build<const D: usize>(
 /// The box of a facet.
 fn bounds_of<const D: usize>(corners: &[Point<D>; D]) -> Bounds<D> {
     let mut bounds = Bounds { min: corners[0], max: corners[0] };
-    for p in &corners[1..] {
-        for k in 0..D {
-            bounds.min[k] = bounds.min[k].min(p[k]);
-            bounds.max[k] = bounds.max[k].max(p[k]);
-        }
-    }
+    corners[1..].iter().for_each(|p| bounds.include(p));
     bounds
 }
 

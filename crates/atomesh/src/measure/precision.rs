@@ -1,9 +1,9 @@
-//! How much of what a mesh shows as features is on features.
+//! How much of the facets that a mesh shows as features lies on features.
 //!
-//! Recall asks features whether facets follow them; precision asks facets. Facets are *selected* as faults are
-//! picked from a mesh, by the mean of b along them, and their length (area) counts where they run within τ of a
-//! feature. Features are known by points about one sample apart, so each stands for the disc around it that
-//! reaches half a sample's diagonal along the feature: together the discs leave no gap.
+//! Recall is the share of features that facets follow, precision the share of facets that follow features. Facets are
+//! *selected* as faults are picked from a mesh, by the mean of b along them, and their length (area) counts where they
+//! run within τ of a feature. Features are known by points about one sample apart. Each stands for the disc around it
+//! that reaches half a sample's diagonal along the feature, so that the discs leave no gap.
 
 use super::MeasureError;
 use super::faces::faces;
@@ -18,7 +18,7 @@ use rayon::prelude::*;
 /// The mean of b along a facet at or below which it is selected, as for picking faults.
 const FACET_THRESHOLD: f64 = -0.2;
 
-/// Parts of a facet's longest edge, at most.
+/// The most parts of a facet's longest edge.
 const MOST_PARTS: usize = 64;
 
 /// What of the selected facets lies on features.
@@ -27,11 +27,11 @@ const MOST_PARTS: usize = 64;
 pub struct PrecisionReport {
     /// Facets with a mean of b at or below this are selected.
     pub threshold: f64,
-    /// How many are.
+    /// How many facets are selected.
     pub facets_selected: usize,
     /// Their length (2-D) or area (3-D), in samples or their squares.
     pub measure_selected: f64,
-    /// The share of it within τ of a feature; `None` if no facet is selected.
+    /// The share of this measure within τ of a feature; `None` if no facet is selected.
     pub precision: Option<f64>,
 }
 
@@ -57,7 +57,7 @@ impl PrecisionOptions {
 /// 2-D). The same at any thread count. Cost: O(area of facets).
 ///
 /// # Errors
-/// [`MeasureError`] if there are not as many values as the shape says, the size is no length, or the watch ends
+/// [`MeasureError`] if there are not as many values as the shape says, the size is not a finite number above 0, or the watch ends
 /// the work.
 pub fn precision<const D: usize>(
     mesh: &Mesh<D>,
@@ -168,7 +168,7 @@ fn linear<const D: usize>(potential: SampledPotential<'_, D>, p: &Point<D>) -> f
 struct Bins<'a, const D: usize> {
     features: &'a [FeaturePoint<D>],
     tau: f64,
-    /// How far along a feature a point stands for it.
+    /// The radius of the disc of feature for which a point stands.
     reach: f64,
     side: f64,
     shape: [usize; D],

@@ -71,13 +71,12 @@ pub(super) fn percentile(values: &mut [f64], percent: f64) -> f64 {
 pub struct Histogram {
     /// The width of a bin, in the unit of the values.
     pub width: f64,
-    /// How many values each bin holds: bin i those in [i, i + 1) · width, the last its upper end
-    /// and beyond too.
+    /// How many values each bin holds: bin i those in [i, i + 1) · width, the last also those beyond.
     pub counts: Vec<u64>,
 }
 
 impl Histogram {
-    /// Counts values, none of which is below 0.
+    /// Counts values of 0 or more.
     pub(super) fn of(values: &[f64], width: f64, bins: usize) -> Self {
         let part = |values: &[f64]| {
             let mut counts = vec![0; bins];

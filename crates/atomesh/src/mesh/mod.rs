@@ -20,7 +20,6 @@ pub use poly_mesh::{
 };
 pub use quadratic::Quadratic;
 use rayon::prelude::*;
-pub(crate) use tags::sides_of;
 pub use tags::{
     FacetGroup, MASK_NAME, Regions, Tags, TagsError, feature_name, interface_name, is_feature_name,
     region_name, side_name,
@@ -168,4 +167,24 @@ fn compensated_sum(terms: impl Iterator<Item = f64>) -> f64 {
         sum = total;
     }
     sum + lost
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn cells_of_a_mirrored_mesh_stay_positive() {
+        let points = vec![[0.0; 3], [1.0, 0.0, 0.0], [0.0, 1.0, 0.0], [0.0, 0.0, 1.0]];
+        let mesh = Mesh::new(points, vec![0, 1, 2, 3]).unwrap();
+        let mirrored = mesh.moved(true, |p| [-2.0 * p[0], p[1], p[2] + 5.0]);
+        assert_eq!(mirrored.validate(), Ok(()));
+        assert_eq!((mirrored.measure(), mirrored.points()[1]), (2.0 / 6.0, [-2.0, 0.0, 5.0]));
+        assert_eq!(mirrored.moved(true, |p| [-0.5 * p[0], p[1], p[2] - 5.0]), mesh);
+    }
+
+    #[test]
+    fn compensated_sums_keep_small_terms() {
+        assert_eq!(compensated_sum([1e17, 1.0, -1e17].into_iter()), 1.0);
+    }
 }

@@ -50,13 +50,13 @@ pub(super) fn update<T: Send, S: Sync + Copy>(
     target.par_chunks_mut(BLOCK).zip(source.par_chunks(BLOCK)).for_each(|(t, s)| each(t, s));
 }
 
-/// The inner products of each of some vectors with three others, all of one length, in one pass over
+/// The inner products of each of some vectors with `a`, `b` and `c`, all of one length, in one pass over
 /// memory.
-pub(super) fn dots(vectors: &[&[f32]], others: (&[f32], &[f32], &[f64])) -> Vec<[f64; 3]> {
-    let length = others.0.len();
+pub(super) fn dots(vectors: &[&[f32]], a: &[f32], b: &[f32], c: &[f64]) -> Vec<[f64; 3]> {
+    let length = a.len();
     let of_block = |start: usize| {
         let part = start..(start + BLOCK).min(length);
-        let (a, b, c) = (&others.0[part.clone()], &others.1[part.clone()], &others.2[part.clone()]);
+        let (a, b, c) = (&a[part.clone()], &b[part.clone()], &c[part.clone()]);
         vectors.iter().map(|v| three_dots(&v[part.clone()], a, b, c)).collect::<Vec<[f64; 3]>>()
     };
     let starts: Vec<usize> = (0..length).step_by(BLOCK).collect();
@@ -94,11 +94,7 @@ fn three_dots(v: &[f32], a: &[f32], b: &[f32], c: &[f64]) -> [f64; 3] {
 
 /// Writes the sum of `first`, times its weight, and of the vectors, times theirs, into `target`, in
 /// one pass over memory.
-pub(super) fn combine(
-    target: &mut [f64],
-    (first, weight): (&[f64], f64),
-    vectors: &[(&[f32], f64)],
-) {
+pub(super) fn combine(target: &mut [f64], first: &[f64], weight: f64, vectors: &[(&[f32], f64)]) {
     target.par_chunks_mut(BLOCK).zip(first.par_chunks(BLOCK)).enumerate().for_each(
         |(b, (target, first))| {
             target.iter_mut().zip(first).for_each(|(t, x)| *t = weight * x);

@@ -1,8 +1,8 @@
 //! Minimizing a smooth function of many variables, without knowing what it is.
 //!
-//! [`Lbfgs`] is the limited-memory BFGS method by its two-loop recursion (Byrd, Nocedal & Schnabel
-//! 1996); [`descend`] is plain steepest descent, the slow reference. Both work one iteration at a time, so that a caller
-//! can watch, cancel, or change the function in between.
+//! [`Lbfgs`] is the limited-memory BFGS method by its two-loop recursion (Byrd, Nocedal & Schnabel 1996);
+//! [`descend`] is plain steepest descent, the slow reference. Both work one iteration at a time, so that a
+//! caller can watch, cancel, or change the function in between.
 
 mod blocks;
 mod lbfgs;
@@ -27,7 +27,7 @@ pub trait Objective {
 
     /// Shortens parts of a direction that are out of proportion, so that they do not hold back the rest.
     /// Default: none.
-    fn temper(&mut self, direction: &mut [f64]) {
+    fn shorten(&mut self, direction: &mut [f64]) {
         let _ = direction;
     }
 

@@ -84,8 +84,8 @@ impl State {
                 alpha = interpolate(low, high, self.value, slope, value);
                 continue;
             }
-            let flat = dot(&self.trial_gradient, direction) >= WOLFE * slope;
-            if flat || alpha >= longest || high.is_finite() {
+            let is_flat = dot(&self.trial_gradient, direction) >= WOLFE * slope;
+            if is_flat || alpha >= longest || high.is_finite() {
                 return (Step::Lower, value);
             }
             low = alpha;

@@ -22,7 +22,7 @@ mod pairs;
 use rayon::prelude::*;
 
 use crate::crests::{FeaturePoint, sites};
-use crate::fields::{Fields, ImageWeight};
+use crate::fields::{FieldsView, ImageWeight};
 use crate::lattice::{Lattice, LatticeError, Scatterer, fill_holes};
 use crate::optimize::{OptimizeError, OptimizeOptions, OptimizeReport, optimize};
 use crate::watch::{Cancelled, Phase, Watch, check};
@@ -116,7 +116,7 @@ pub struct Settling<'a, const D: usize> {
 pub fn mirror<const D: usize>(
     lattice: Lattice<D>,
     crests: &[FeaturePoint<D>],
-    fields: Fields<'_, D>,
+    fields: FieldsView<'_, D>,
     settling: Settling<'_, D>,
     watch: &mut dyn Watch,
 ) -> Result<MirroredLattice<D>, MirrorError> {
@@ -134,7 +134,7 @@ pub fn mirror<const D: usize>(
     let none = ImageWeight::constant(0.0).expect("0 is a weight");
     let weight = if fields.potential.range().0 < 0.0 { fields.weight } else { &none };
     let options = OptimizeOptions { smoothing_steps: 0, ..settling.options.clone() };
-    let settled = optimize(lattice, Fields { weight, ..fields }, &options, watch)?;
+    let settled = optimize(lattice, FieldsView { weight, ..fields }, &options, watch)?;
     let (lattice, optimize_report) = settled.into_parts();
     let lattice = without_excluded(lattice, &exclusion, CLEAR[1]);
     Ok(MirroredLattice { lattice, report, optimize_report })

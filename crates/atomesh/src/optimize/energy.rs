@@ -6,36 +6,43 @@ use crate::energy::{Energy, Engine};
 use crate::geometry::{Bounds, Point};
 use crate::lattice::Lattice;
 use crate::minimize::Objective;
+use crate::watch::AtomsView;
 
 /// An [`Objective`] whose variables are the atoms' coordinates.
 ///
 /// What the box or a temperature of 0 holds has gradient 0 and so never moves. A temperature T between
 /// scales its variables: with x = x₀ + T (z − x₀) the gradient by z is T times that by x.
-pub(super) struct LatticeEnergy<E, const D: usize> {
+pub(super) struct LatticeEnergy<'e, const D: usize> {
     lattice: Lattice<D>,
-    engine: E,
+    engine: Box<dyn Engine<D> + 'e>,
     margin: f64,
     /// The farthest an atom may go in any iteration, over its nominal distance.
     longest_move: f64,
-    /// The farthest it may go in the next one: twice the last move, since moves shrink towards a minimum
-    /// and the engine need not be ready for more.
+    /// The farthest it may go in the next one: at most twice the last move, since moves shrink towards a
+    /// minimum and the engine need not be ready for more.
     next_move: f64,
     /// The farthest that the last direction moves an atom, over its nominal distance.
     reach: f64,
     /// dx/dz of each variable, 0…1.
     mobility: Vec<f32>,
-    /// Whether some mobility is neither 0 nor 1, so that x differs from z.
-    tempered: bool,
-    /// The atoms at x, where that differs from the variables.
-    atoms: Vec<Point<D>>,
+    /// The atoms at x, if some mobility is neither 0 nor 1, so that x differs from z.
+    atoms: Option<Vec<Point<D>>>,
+    /// As of the last evaluation.
+    energy: Energy,
 }
 
-impl<E: Engine<D>, const D: usize> LatticeEnergy<E, D> {
-    pub fn new(lattice: Lattice<D>, mut engine: E, margin: f64, longest_move: f64) -> Self {
+impl<'e, const D: usize> LatticeEnergy<'e, D> {
+    pub fn new(
+        lattice: Lattice<D>,
+        mut engine: Box<dyn Engine<D> + 'e>,
+        margin: f64,
+        longest_move: f64,
+    ) -> Self {
         let mobility: Vec<f32> =
             (0..lattice.len() * D).map(|v| lattice.mobility(v / D, v % D) as f32).collect();
         engine.prepare(lattice.atoms(), longest_move);
-        let tempered = mobility.iter().any(|&m| m != 0.0 && m != 1.0);
+        let is_tempered = mobility.iter().any(|&m| m != 0.0 && m != 1.0);
+        let atoms = is_tempered.then(|| lattice.atoms().to_vec());
         Self {
             lattice,
             engine,
@@ -44,8 +51,8 @@ impl<E: Engine<D>, const D: usize> LatticeEnergy<E, D> {
             next_move: longest_move,
             reach: 0.0,
             mobility,
-            tempered,
-            atoms: Vec::new(),
+            atoms,
+            energy: Energy::default(),
         }
     }
 
@@ -72,7 +79,7 @@ impl<E: Engine<D>, const D: usize> LatticeEnergy<E, D> {
         }
     }
 
-    /// Readies the engine for a first iteration from `z`; says whether the energy has become another
+    /// Readies the engine for a first iteration from `z`; returns whether the energy has become another
     /// function.
     pub fn prepare(&mut self, z: &[f64]) -> bool {
         self.prepare_for(z, self.longest_move)
@@ -85,34 +92,43 @@ impl<E: Engine<D>, const D: usize> LatticeEnergy<E, D> {
 
     fn prepare_for(&mut self, z: &[f64], next_move: f64) -> bool {
         self.next_move = next_move;
-        self.temper(z);
-        let atoms = if self.tempered { &self.atoms[..] } else { z.as_chunks::<D>().0 };
+        self.place(z);
+        let atoms = self.atoms.as_deref().unwrap_or(z.as_chunks().0);
         self.engine.prepare(atoms, next_move)
     }
 
     /// The energy at `z`, d and β read there, for the report.
     pub fn evaluate_at(&mut self, z: &[f64]) -> Energy {
         let mut gradient = vec![[0.0; D]; z.len() / D];
-        self.temper(z);
-        let atoms = if self.tempered { &self.atoms[..] } else { z.as_chunks::<D>().0 };
-        self.engine.prepare(atoms, 1.0); // farther than any list reaches: all is read anew
+        self.place(z);
+        let atoms = self.atoms.as_deref().unwrap_or(z.as_chunks().0);
+        self.engine.prepare(atoms, 1.0); // farther than any list reaches, so that all is read again
         self.engine.evaluate(atoms, &mut gradient)
     }
 
     /// The lattice with its atoms at `z`.
     pub fn into_lattice(mut self, z: &[f64]) -> Lattice<D> {
-        self.temper(z);
-        let atoms = if self.tempered { self.atoms } else { z.as_chunks::<D>().0.to_vec() };
+        self.place(z);
+        let atoms = self.atoms.unwrap_or_else(|| z.as_chunks().0.to_vec());
         self.lattice.moved_to(atoms)
     }
 
-    fn temper(&mut self, z: &[f64]) {
-        if !self.tempered {
-            return;
+    /// What a watch may see where the last evaluation was, at `z`.
+    pub fn view<'z>(&'z self, z: &'z [f64]) -> AtomsView<'z> {
+        AtomsView {
+            dimension: D,
+            coordinates: self.atoms.as_ref().map_or(z, |atoms| atoms.as_flattened()),
+            distances: self.engine.distances(),
+            energy_atomic: self.energy.atomic,
+            energy_image: self.energy.image,
         }
-        self.atoms.resize(z.len() / D, [0.0; D]);
+    }
+
+    /// Puts the atoms where the variables say, where these are not their coordinates.
+    fn place(&mut self, z: &[f64]) {
+        let Some(atoms) = &mut self.atoms else { return };
         let start = self.lattice.atoms().as_flattened();
-        let x = self.atoms.as_flattened_mut();
+        let x = atoms.as_flattened_mut();
         for v in 0..z.len() {
             x[v] = start[v] + f64::from(self.mobility[v]) * (z[v] - start[v]);
         }
@@ -132,12 +148,12 @@ impl<E: Engine<D>, const D: usize> LatticeEnergy<E, D> {
 /// Atoms that one thread works on at a time.
 const CHUNK: usize = 2048;
 
-impl<E: Engine<D>, const D: usize> Objective for LatticeEnergy<E, D> {
+impl<const D: usize> Objective for LatticeEnergy<'_, D> {
     fn evaluate(&mut self, z: &[f64], gradient: &mut [f64]) -> f64 {
-        self.temper(z);
-        let atoms = if self.tempered { &self.atoms[..] } else { z.as_chunks::<D>().0 };
+        self.place(z);
+        let atoms = self.atoms.as_deref().unwrap_or(z.as_chunks().0);
         let slopes = gradient.as_chunks_mut::<D>().0;
-        let energy = self.engine.evaluate(atoms, slopes);
+        self.energy = self.engine.evaluate(atoms, slopes);
         let (z, mobility) = (z.as_chunks::<D>().0, self.mobility.as_chunks::<D>().0);
         let distances = self.engine.distances();
         let this = &*self;
@@ -149,7 +165,7 @@ impl<E: Engine<D>, const D: usize> Objective for LatticeEnergy<E, D> {
                 slope[k] = if outward { 0.0 } else { slope[k] * f64::from(mobility[i][k]) };
             }
         });
-        energy.total()
+        self.energy.total()
     }
 
     fn longest_step(&mut self, direction: &[f64]) -> f64 {
@@ -165,7 +181,7 @@ impl<E: Engine<D>, const D: usize> Objective for LatticeEnergy<E, D> {
         if self.reach > 0.0 { self.next_move / self.reach } else { f64::INFINITY }
     }
 
-    fn temper(&mut self, direction: &mut [f64]) {
+    fn shorten(&mut self, direction: &mut [f64]) {
         let (limit, distances) = (self.next_move, self.engine.distances());
         direction
             .as_chunks_mut::<D>()

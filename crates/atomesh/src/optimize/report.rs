@@ -60,10 +60,10 @@ impl Stage {
 }
 
 /// What a run of the optimizer did.
-#[derive(Clone, Debug, PartialEq, serde::Serialize)]
+#[derive(Clone, Debug, Default, PartialEq, serde::Serialize)]
 pub struct OptimizeReport {
-    /// What computed the energy.
-    pub engine: EngineKind,
+    /// What computed the energy; `None`: an engine of the caller's.
+    pub engine: Option<EngineKind>,
     /// Evaluations of energy and gradient in all.
     pub evaluations: usize,
     /// (1 − β) A at the end.
@@ -75,9 +75,9 @@ pub struct OptimizeReport {
 }
 
 impl OptimizeReport {
-    /// The report of a lattice that nobody has moved.
+    /// The report of a lattice that was not moved.
     pub fn new(engine: EngineKind) -> Self {
-        Self { engine, evaluations: 0, energy_atomic: 0.0, energy_image: 0.0, stages: Vec::new() }
+        Self { engine: Some(engine), ..Self::default() }
     }
 
     pub(super) fn finish_stage(&mut self, stage: Stage, energy: Energy, evaluations: usize) {

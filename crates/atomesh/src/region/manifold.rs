@@ -19,8 +19,8 @@ const NONE: u32 = u32::MAX;
 /// kind without them.
 const SLIVER: f64 = 0.25;
 
-/// Which of the `kept` cells of a mesh stay so that their boundary is a manifold. Those that `peelable` names, whose
-/// corners are all on the outline, go first.
+/// Which of the `kept` cells of a mesh stay so that their boundary is a manifold. `peelable` cells, with all corners on
+/// the outline and no facet on a side of the box, go first.
 pub(super) fn until_manifold<const D: usize>(
     mesh: &Mesh<D>,
     peelable: Vec<bool>,
@@ -38,7 +38,7 @@ pub(super) fn until_manifold<const D: usize>(
 /// A mesh of which some cells are kept.
 struct Part<'a, const D: usize> {
     mesh: &'a Mesh<D>,
-    /// Whether all corners of a cell are on the outline.
+    /// Whether all corners of a cell are on the outline, and none of its facets on a side of the box.
     peelable: Vec<bool>,
     kept: Vec<bool>,
     measures: Vec<f64>,

@@ -9,7 +9,7 @@
 use rayon::prelude::*;
 
 use crate::geometry::{Bounds, Point, distance_squared};
-use crate::mesh::{Mesh, sides_of};
+use crate::mesh::Mesh;
 use crate::watch::{Phase, Watch, check};
 
 use super::manifold::until_manifold;
@@ -97,7 +97,7 @@ fn centroid<const D: usize>(mesh: &Mesh<D>, cell: &[u32]) -> Point<D> {
 
 /// Whether points lie on one side of the box.
 fn is_on_side<const D: usize>(mesh: &Mesh<D>, points: &[u32], bounds: &Bounds<D>) -> bool {
-    let sides = points.iter().map(|&c| sides_of(&mesh.points()[c as usize], bounds, 0.0));
+    let sides = points.iter().map(|&c| bounds.sides(&mesh.points()[c as usize], 0.0));
     sides.fold(!0, |shared, sides| shared & sides) != 0
 }
 

@@ -8,7 +8,7 @@ use crate::mesh::Mesh;
 use crate::mirror::MirrorReport;
 use crate::optimize::OptimizeReport;
 use crate::region::{join_islands, outline_facets};
-use crate::sample::{SampleOptions, Statistic, sample_placed};
+use crate::sample::{SampleOptions, Statistic, sample_in_frame};
 use crate::watch::Watch;
 
 use super::error::RunError;
@@ -56,7 +56,8 @@ pub(super) fn finish<const D: usize>(
     watch: &mut dyn Watch,
 ) -> Result<Outcome<D>, RunError> {
     let Improved { run, mesh, report, mirror_report, improve_report } = improved;
-    let Parts { potential, distance, outline, labels, .. } = run.parts();
+    let Parts { outline, labels, .. } = run.parts();
+    let (potential, distance) = (run.potential(), run.distance());
     let outline_facets = match outline {
         Some(_) => outline_facets(&mesh, &run.bounds()),
         None => Vec::new(),
@@ -94,7 +95,7 @@ fn label<const D: usize>(
     let frame = frame.expect("a grid has samples and steps above 0");
     let samples = Samples::I32(samples.to_vec());
     let statistics = SampleOptions::new(&[Statistic::Majority]);
-    let found = sample_placed(mesh, &frame, &samples, statistics, watch)?;
+    let found = sample_in_frame(mesh, &frame, &samples, statistics, watch)?;
     let mut labels: Vec<i32> = found.values[0].iter().map(|&label| label as i32).collect();
     join_islands(mesh, &mut labels, options.least_island);
     Ok(labels)

@@ -1,6 +1,6 @@
 //! What differs between 2-D and 3-D, as a value.
 
-use crate::improve::{Improver, PlaneImprover, Space};
+use crate::improve::{Improver, PlaneImprover, SpaceImprover};
 use crate::lattice::{Crystal, Scatterer};
 use crate::mesh::Delaunay;
 
@@ -61,7 +61,7 @@ impl Method<3> {
             scatterer: Scatterer::<3>::new(),
             scattered: Filling { density: 1.36, rim: 0.85 },
             evening: None,
-            improver: Some(&Space),
+            improver: Some(&SpaceImprover),
             stages: &compiled::SPACE,
         }
     }

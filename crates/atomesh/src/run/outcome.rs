@@ -297,12 +297,9 @@ pub(super) fn tags_of<const D: usize>(outcome: &Outcome<D>) -> Result<Tags<D>, T
 pub(super) fn quadratic_of<const D: usize>(outcome: &Outcome<D>) -> Quadratic<D> {
     let mut quadratic = Quadratic::new(&outcome.mesh);
     if let Some(outline) = outcome.outline() {
-        let all = ((1 << D) - 1) as u8;
         let bounds = outcome.run.bounds();
         quadratic.curve(&outcome.outline_facets, |p| {
-            let side = |k: &usize| p[*k] == bounds.min[*k] || p[*k] == bounds.max[*k];
-            let held: u8 = (0..D).filter(side).map(|k| 1 << k).sum();
-            outline.project(p, all & !held, 0.3 * outcome.distance().at(p))
+            outline.project(p, bounds.freedom(p), 0.3 * outcome.distance().at(p))
         });
     }
     let (frame, units) = (outcome.frame(), outcome.units());
@@ -312,7 +309,7 @@ pub(super) fn quadratic_of<const D: usize>(outcome: &Outcome<D>) -> Quadratic<D>
 /// The sides of a mesh in lattice coordinates, turned as a move to the world turns its cells; see
 /// [`Tags::sides`]. A point may be off a side by 1e-9 of the box.
 pub fn sides<const D: usize>(mesh: &Mesh<D>, bounds: &Bounds<D>, mirrored: bool) -> Tags<D> {
-    let extent = bounds.extent().into_iter().fold(0.0, f64::max);
+    let extent = bounds.longest_edge();
     let tags = Tags::sides(mesh, bounds, 1e-9 * extent);
     if mirrored { tags.turned() } else { tags }
 }

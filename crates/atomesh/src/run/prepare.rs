@@ -2,7 +2,7 @@
 
 use crate::enhance::{self, FeatureOptions, Features};
 use crate::fields::{
-    GRADIENT_LIMIT, Grading, ImageWeight, NominalDistance, ScalarField, default_distance,
+    Fields, GRADIENT_LIMIT, Grading, ImageWeight, NominalDistance, ScalarField, default_distance,
 };
 use crate::image::{Frame, Grid, Image};
 use crate::region::{Outline, label_samples};
@@ -47,20 +47,10 @@ pub(super) fn prepare<const D: usize>(
     let weight = weight(&inputs, grid, options.image_weight)?;
     warnings.extend(coarse(&grid, &distance));
     check(watch, Phase::Distance, 1.0, None)?;
-    let potential = ScalarField::new(grid, samples, options.interpolation)?;
+    let potential = ScalarField::potential(grid, samples, options.interpolation)?;
+    let fields = Fields::new(potential, weight, distance)?;
     let method = method.clone();
-    Ok(Prepared::new(Parts {
-        method,
-        options,
-        frame,
-        grid,
-        potential,
-        weight,
-        distance,
-        outline,
-        labels,
-        warnings,
-    }))
+    Ok(Prepared::new(Parts { method, options, frame, grid, fields, outline, labels, warnings }))
 }
 
 /// Where the mesh ends, if there is a mask and it does not hold the whole box.

@@ -3,7 +3,7 @@
 use std::fmt;
 use std::sync::Arc;
 
-use crate::fields::{Fields, ImageWeight, Interpolation, NominalDistance, ScalarField};
+use crate::fields::{Fields, FieldsView, Interpolation, NominalDistance, ScalarField};
 use crate::geometry::{Bounds, Point, compact_order};
 use crate::image::{Frame, Grid};
 use crate::lattice::{
@@ -35,9 +35,7 @@ pub(super) struct Parts<const D: usize> {
     pub options: MeshOptions<D>,
     pub frame: Frame<D>,
     pub grid: Grid<D>,
-    pub potential: ScalarField<D>,
-    pub weight: ImageWeight<D>,
-    pub distance: NominalDistance<D>,
+    pub fields: Fields<D>,
     /// Where the mesh ends, if it does not fill the box.
     pub outline: Option<Outline<D>>,
     pub labels: Option<Vec<i32>>,
@@ -76,19 +74,18 @@ impl<const D: usize> Prepared<D> {
     }
 
     /// The fields that atoms move in.
-    pub fn fields(&self) -> Fields<'_, D> {
-        let Parts { potential, weight, distance, .. } = &*self.0;
-        Fields { potential, weight, distance }
+    pub fn fields(&self) -> FieldsView<'_, D> {
+        self.0.fields.view()
     }
 
     /// b(x).
     pub fn potential(&self) -> &ScalarField<D> {
-        &self.0.potential
+        self.0.fields.potential()
     }
 
     /// d(x).
     pub fn distance(&self) -> &NominalDistance<D> {
-        &self.0.distance
+        self.0.fields.distance()
     }
 
     /// Where the mesh ends, if a mask says so.
@@ -103,10 +100,10 @@ impl<const D: usize> Prepared<D> {
 
     /// What the rest of the work will take.
     pub fn estimate(&self) -> Estimate {
-        let Parts { method, options, grid, distance, .. } = &*self.0;
+        let Parts { method, options, grid, .. } = &*self.0;
         let filling = method.filling(options.lattice);
         let share = self.outline().map_or(1.0, Outline::mean_share);
-        let atoms = share * estimate::atoms(grid, distance, filling);
+        let atoms = share * estimate::atoms(grid, self.distance(), filling);
         let field = options.optimize.engine == EngineKind::Sampled;
         let spline = options.interpolation == Interpolation::Spline;
         let smooth = options.optimize.smoothing_steps > 0;
@@ -156,9 +153,7 @@ impl<const D: usize> Prepared<D> {
         if let Some(p) = mesh.points().iter().find(|p| !bounds.contains(p)) {
             self.check_box(&Bounds { min: *p, max: *p })?;
         }
-        let inside = |p: &Point<D>, k: usize| bounds.min[k] < p[k] && p[k] < bounds.max[k];
-        let of = |p| (0..D).filter(|&k| inside(p, k)).fold(0, |set: u8, k| set | 1 << k);
-        let mut freedom: Vec<u8> = mesh.points().iter().map(of).collect();
+        let mut freedom: Vec<u8> = mesh.points().iter().map(|p| bounds.freedom(p)).collect();
         for &point in outline_facets(&mesh, &bounds).as_flattened() {
             freedom[point as usize] = 0;
         }
@@ -199,10 +194,11 @@ impl<const D: usize> Prepared<D> {
 
     /// Whether atoms stay as they were grown: nothing pulls them, and they are evened out already.
     pub(super) fn stays_as_grown(&self) -> bool {
-        let Parts { method, options, weight, distance, outline, .. } = &*self.0;
+        let Parts { method, options, outline, .. } = &*self.0;
+        let FieldsView { potential, weight, distance } = self.fields();
         let is_crystal = options.lattice != LatticeKind::Random && outline.is_none();
         let is_even = is_crystal && method.evening().is_some() && !distance.is_constant();
-        is_even && (weight.as_constant() == Some(0.0) || self.potential().range() == (0.0, 0.0))
+        is_even && (weight.as_constant() == Some(0.0) || potential.range() == (0.0, 0.0))
     }
 }
 
@@ -211,7 +207,8 @@ pub(super) fn fill<const D: usize>(
     run: &Prepared<D>,
     watch: &mut dyn Watch,
 ) -> Result<Filled<D>, RunError> {
-    let Parts { method, options, frame, distance, outline, .. } = run.parts();
+    let Parts { method, options, frame, outline, .. } = run.parts();
+    let distance = run.distance();
     let estimate = run.estimate();
     if let Some(available) = options.memory_limit
         && estimate.memory > available
@@ -223,7 +220,7 @@ pub(super) fn fill<const D: usize>(
     let seed_points: Vec<Point<D>> = (options.seed_points.iter())
         .map(|p| frame.world_to_lattice(units, p))
         // a point meant to be on the boundary may come back a rounding outside
-        .map(|p| snap_to(&p, &bounds))
+        .map(|p| bounds.snap(&p))
         .collect();
     let lattice = match method.crystal(options.lattice)? {
         Some(crystal) => {
@@ -247,7 +244,8 @@ fn even_out<const D: usize>(
     lattice: Lattice<D>,
     watch: &mut dyn Watch,
 ) -> Result<Lattice<D>, RunError> {
-    let Parts { method, distance, outline, .. } = run.parts();
+    let Parts { method, outline, .. } = run.parts();
+    let distance = run.distance();
     let is_even = distance.is_constant() || outline.is_some();
     let (Some(evening), false) = (method.evening(), is_even) else {
         return Ok(lattice);
@@ -259,12 +257,4 @@ fn even_out<const D: usize>(
         lattice = settle(scatterer, lattice, distance, evening.sweeps, watch)?;
     }
     Ok(lattice)
-}
-
-/// The nearest point of the box, if it is within a rounding of it; else the point itself.
-fn snap_to<const D: usize>(p: &Point<D>, bounds: &Bounds<D>) -> Point<D> {
-    let inside = bounds.clamp(p);
-    let extent = bounds.extent();
-    let near = (0..D).all(|k| (inside[k] - p[k]).abs() <= 1e-9 * extent[k]);
-    if near { inside } else { *p }
 }

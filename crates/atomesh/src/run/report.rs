@@ -4,8 +4,8 @@ use crate::geometry::Bounds;
 use crate::image::{Frame, Grid, Samples};
 use crate::measure::{
     AlignmentOptions, AlignmentReport, FidelityReport, HomogeneityReport, MeasureError,
-    PrecisionOptions, SampledPotential, ShapeReport, SpreadReport, WantedSize, alignment, alignment_of_faces, features,
-    fidelity, precision, shape, spread,
+    PrecisionOptions, SampledPotential, ShapeReport, SpreadReport, WantedSize, alignment,
+    alignment_of_faces, features, fidelity, precision, shape, spread,
 };
 use crate::mesh::{Mesh, PolyReport};
 use crate::watch::Watch;
@@ -67,7 +67,7 @@ impl MeshReport {
     ) -> Result<Self, MeasureError> {
         let spread = spread(mesh, size, watch)?;
         let shape = shape(mesh, bounds.as_ref(), watch)?;
-        let size = samples_of(size.mean, grid);
+        let size = grid.in_samples(size.mean);
         let b = SampledPotential { values: potential, shape: grid.shape };
         let found = features(b, size, watch)?;
         let options = AlignmentOptions::new(size);
@@ -77,11 +77,6 @@ impl MeshReport {
         alignment.selected = Some(selected);
         Ok(Self { shape, alignment, spread, fidelity: None, homogeneity: None })
     }
-}
-
-/// A length in samples: by the geometric mean over the axes, where steps differ.
-fn samples_of<const D: usize>(length: f64, grid: &Grid<D>) -> f64 {
-    length / grid.step.iter().product::<f64>().powf(1.0 / D as f64)
 }
 
 /// [`Outcome::cells_report`].
@@ -94,7 +89,7 @@ pub(super) fn of_cells<const D: usize>(
     };
     let (potential, distance) = (outcome.potential(), outcome.distance());
     let grid = potential.grid();
-    let size = samples_of(distance.mean(), grid);
+    let size = grid.in_samples(distance.mean());
     let valleys: Vec<f32> = potential.samples().iter().map(|b| -b.abs()).collect();
     let b = SampledPotential { values: &valleys, shape: grid.shape };
     let found = features(b, size, watch)?;
@@ -123,5 +118,5 @@ pub(super) fn fidelity_of<const D: usize>(
     let grid = outcome.potential().grid();
     let frame = Frame::new(grid.shape).and_then(|frame| frame.with_spacing(grid.step));
     let frame = frame.expect("a grid's shape and step were a frame's");
-    Ok(fidelity(outcome.mesh(), (&frame, samples), watch)?)
+    Ok(fidelity(outcome.mesh(), &frame, samples, watch)?)
 }

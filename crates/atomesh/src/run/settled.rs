@@ -4,9 +4,7 @@ use crate::lattice::{Lattice, Outlined};
 use crate::mesh::{Mesh, merge_duplicates};
 use crate::mirror::MirrorReport;
 use crate::optimize::OptimizeReport;
-use crate::region::{
-    Outline, RegionError, Trimmed, fit_facets, smooth_outline, trim_to_outline,
-};
+use crate::region::{Outline, RegionError, Trimmed, fit_facets, smooth_outline, trim_to_outline};
 use crate::voronoi::{sites_apart, voronoi};
 use crate::watch::Watch;
 
@@ -113,7 +111,7 @@ fn connect_within<const D: usize>(
     outline: &Outline<D>,
     watch: &mut dyn Watch,
 ) -> Result<Trimmed<D>, RunError> {
-    let Parts { method, distance, .. } = run.parts();
+    let (Parts { method, .. }, distance) = (run.parts(), run.distance());
     let outlined = Outlined::new(lattice, outline, distance);
     if outlined.lattice().len() <= D {
         return Err(RegionError::SmallMask { distance: distance.least() }.into());

@@ -118,14 +118,14 @@ impl CellProperties {
 /// The statistics of the samples of `image` in each of `cells`, which lie in the world.
 ///
 /// # Errors
-/// As [`sample_placed`].
+/// As [`sample_in_frame`].
 pub fn sample<const D: usize>(
     cells: &impl CellSurfaces<D>,
     image: &Image<D>,
     options: SampleOptions<'_>,
     watch: &mut dyn Watch,
 ) -> Result<CellProperties, SampleError> {
-    sample_placed(cells, image.frame(), image.samples(), options, watch)
+    sample_in_frame(cells, image.frame(), image.samples(), options, watch)
 }
 
 /// [`sample`] for samples and cells in any coordinates that `frame` maps samples to, such as lattice coordinates.
@@ -133,7 +133,7 @@ pub fn sample<const D: usize>(
 /// # Errors
 /// [`SampleError`] if the image has one sample along an axis or another number of samples than the frame, a
 /// mean or majority is not defined for the samples, or the watch ends the work.
-pub fn sample_placed<const D: usize>(
+pub fn sample_in_frame<const D: usize>(
     cells: &impl CellSurfaces<D>,
     frame: &Frame<D>,
     samples: &Samples,

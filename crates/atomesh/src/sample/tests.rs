@@ -82,7 +82,7 @@ fn overlaps<const D: usize>(mesh: &Mesh<D>, shape: [usize; D]) -> Vec<f64> {
             samples[i] = 1.0;
             let options = SampleOptions::new(&[Statistic::Total]);
             let samples = Samples::F64(samples);
-            sample_placed(mesh, &frame, &samples, options, &mut Silent).unwrap().values[0][0]
+            sample_in_frame(mesh, &frame, &samples, options, &mut Silent).unwrap().values[0][0]
         })
         .collect()
 }
@@ -328,7 +328,7 @@ fn wrong_samples_are_refused() {
         let frame = Frame::new(shape).unwrap();
         let kinds = [statistic];
         let (samples, options) = (Samples::F32(samples), SampleOptions::new(&kinds));
-        sample_placed(&mesh, &frame, &samples, options, &mut Silent).err()
+        sample_in_frame(&mesh, &frame, &samples, options, &mut Silent).err()
     };
     assert_eq!(error([2, 2], vec![0.0; 4], Statistic::Mean), None);
     assert_eq!(error([4, 1], vec![0.0; 4], Statistic::Mean), Some(SampleError::Thin { axis: 1 }));

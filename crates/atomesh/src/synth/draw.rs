@@ -2,7 +2,7 @@
 
 use super::random::Random;
 use super::{Shade, SynthError, SynthOptions};
-use crate::image::{Grid, Samples, gaussian};
+use crate::image::{Grid, Samples, coordinates, gaussian};
 use rayon::prelude::*;
 
 /// Samples drawn by one task; even, since noise comes in pairs.
@@ -30,8 +30,8 @@ pub(super) fn draw<const D: usize>(
         gaussian(&mut values, grid.shape, [options.blur; D]);
     }
     if options.noise > 0.0 {
-        let range = values.par_chunks(BLOCK).map(range_of).reduce(|| NO_RANGE, wider);
-        let noise = Noise::new(options, range);
+        let ends = values.par_chunks(BLOCK).map(Ends::of).reduce(|| Ends::NONE, Ends::union);
+        let noise = Noise::new(options, ends);
         let blocks = values.par_chunks_mut(BLOCK).enumerate();
         blocks.for_each(|(block, values)| noise.add(block, values));
     }
@@ -42,8 +42,7 @@ pub(super) fn draw<const D: usize>(
     })
 }
 
-/// The same as bytes that need no blur. With noise the scene is drawn twice, since the noise depends on
-/// its range.
+/// The samples as bytes that need no blur. With noise the scene is drawn twice, since the noise depends on its contrast.
 fn draw_bytes<const D: usize>(
     render: &(impl Fn(usize, &mut [f32]) + Sync),
     grid: &Grid<D>,
@@ -55,9 +54,9 @@ fn draw_bytes<const D: usize>(
             let mut values = [0.0; BLOCK];
             let values = &mut values[..BLOCK.min(count - block * BLOCK)];
             render(block, values);
-            range_of(values)
+            Ends::of(values)
         });
-        Noise::new(options, ends.reduce(|| NO_RANGE, wider))
+        Noise::new(options, ends.reduce(|| Ends::NONE, Ends::union))
     });
     let mut bytes = zeros(0u8, grid)?;
     bytes.par_chunks_mut(BLOCK).enumerate().for_each(|(block, bytes)| {
@@ -87,25 +86,30 @@ fn rounded(value: f32) -> u8 {
     value.round() as u8 // `as` clips to 0..=255
 }
 
-/// The range of no samples.
-const NO_RANGE: (f32, f32) = (f32::INFINITY, f32::NEG_INFINITY);
-
-/// The least and greatest of samples, which are finite, since the greys are.
-fn range_of(values: &[f32]) -> (f32, f32) {
-    values.iter().fold(NO_RANGE, |range, &v| wider(range, (v, v)))
+/// The least and the greatest of some samples, which are finite, since the greys are.
+#[derive(Clone, Copy)]
+struct Ends {
+    least: f32,
+    greatest: f32,
 }
 
-fn wider(a: (f32, f32), b: (f32, f32)) -> (f32, f32) {
-    (a.0.min(b.0), a.1.max(b.1))
+impl Ends {
+    /// Those of no samples.
+    const NONE: Self = Self { least: f32::INFINITY, greatest: f32::NEG_INFINITY };
+
+    fn of(values: &[f32]) -> Self {
+        values.iter().fold(Self::NONE, |ends, &v| ends.union(Self { least: v, greatest: v }))
+    }
+
+    fn union(self, other: Self) -> Self {
+        Self { least: self.least.min(other.least), greatest: self.greatest.max(other.greatest) }
+    }
 }
 
 /// The lattice coordinates of a sample, which are world coordinates in a frame with origin 0.
-fn position<const D: usize>(grid: &Grid<D>, mut index: usize) -> [f64; D] {
-    std::array::from_fn(|k| {
-        let i = index % grid.shape[k];
-        index /= grid.shape[k];
-        i as f64 * grid.step[k]
-    })
+fn position<const D: usize>(grid: &Grid<D>, index: usize) -> [f64; D] {
+    let sample = coordinates(index, grid.shape);
+    std::array::from_fn(|k| sample[k] as f64 * grid.step[k])
 }
 
 /// White Gaussian noise, its deviation a share of the contrast.
@@ -115,9 +119,10 @@ struct Noise {
 }
 
 impl Noise {
-    /// The noise for samples of a range.
-    fn new<const D: usize>(options: &SynthOptions<D>, (least, greatest): (f32, f32)) -> Self {
-        Self { seed: options.seed, deviation: options.noise * f64::from(greatest - least) }
+    /// The noise for samples between `ends`.
+    fn new<const D: usize>(options: &SynthOptions<D>, ends: Ends) -> Self {
+        let contrast = f64::from(ends.greatest - ends.least);
+        Self { seed: options.seed, deviation: options.noise * contrast }
     }
 
     /// Adds the noise of a block to its samples.

@@ -1,12 +1,12 @@
 //! Dark traces on grey: fault traces as in Hale (2001), Fig. 1, and a straight slit.
 
 use super::random::Random;
-use super::truth::{Feature, Geometry, Role};
+use super::truth::{Geometry, Role, TrueFeature};
 use super::{Canvas, Sketch, grey};
 use crate::geometry::{Bounds, Point};
 use std::f64::consts::{PI, TAU};
 
-/// Beyond this many samples from its middle a line is no darker than its surroundings by 1e-6.
+/// The distance from its middle, in samples, beyond which a line is darker than its surroundings by less than 1e-6.
 const REACH: f64 = 7.0;
 /// Points of a trace that crosses the box; it is smooth at this resolution.
 const STEPS: usize = 128;
@@ -59,7 +59,7 @@ pub(super) fn sketch<const D: usize>(canvas: &Canvas<D>, random: &mut Random) ->
         .collect();
     let features = traces
         .iter()
-        .map(|t| Feature { role: Role::Fault, geometry: t.geometry.clone() })
+        .map(|t| TrueFeature { role: Role::Fault, geometry: t.geometry.clone() })
         .collect();
     let canvas = *canvas;
     let shade = move |p: &Point<D>| {
@@ -101,7 +101,7 @@ pub(super) fn slit<const D: usize>(canvas: &Canvas<D>, random: &mut Random) -> S
     (normal[0], normal[1]) = (-angle.sin(), angle.cos());
     let center = canvas.at(&[0.5; D]);
     let geometry = Geometry::Disk { center, normal, radius: 0.25 * canvas.least_extent() };
-    let features = vec![Feature { role: Role::Slit, geometry: geometry.clone() }];
+    let features = vec![TrueFeature { role: Role::Slit, geometry: geometry.clone() }];
     let canvas = *canvas;
     Sketch { features, layers: None, shade: Box::new(move |p| canvas.line(geometry.distance(p))) }
 }

@@ -1,7 +1,7 @@
 //! Grains: the Voronoi cells of well-spread points, neighbours of clearly different greys.
 
 use super::random::Random;
-use super::truth::{Feature, Geometry, Role};
+use super::truth::{Geometry, Role, TrueFeature};
 use super::{Canvas, Sketch};
 use crate::geometry::{Point, distance_squared};
 
@@ -20,7 +20,10 @@ pub(super) fn sketch<const D: usize>(canvas: &Canvas<D>, random: &mut Random) ->
     let step = canvas.step;
     let shaded = centers.clone();
     Sketch {
-        features: vec![Feature { role: Role::Boundary, geometry: Geometry::Grains { centers } }],
+        features: vec![TrueFeature {
+            role: Role::Boundary,
+            geometry: Geometry::Grains { centers },
+        }],
         layers: None,
         shade: Box::new(move |p| shade(p, &shaded, &greys, step)),
     }

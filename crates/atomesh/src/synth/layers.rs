@@ -7,7 +7,7 @@
 //! and nowhere else.
 
 use super::random::Random;
-use super::truth::{Feature, Geometry, Role};
+use super::truth::{Geometry, Role, TrueFeature};
 use super::{Canvas, Sketch, grey};
 use crate::geometry::{Point, difference, dot};
 use serde::ser::{Serialize, SerializeStruct, Serializer};
@@ -132,11 +132,11 @@ fn slip<const D: usize>(canvas: &Canvas<D>, i: usize, random: &mut Random) -> Sl
 }
 
 /// The faults of the layers as features.
-fn features<const D: usize>(layers: &Layers<D>) -> Vec<Feature<D>> {
+fn features<const D: usize>(layers: &Layers<D>) -> Vec<TrueFeature<D>> {
     layers
         .slips
         .iter()
-        .map(|&Slip { center, normal, radius, .. }| Feature {
+        .map(|&Slip { center, normal, radius, .. }| TrueFeature {
             role: Role::Fault,
             geometry: Geometry::Disk { center, normal, radius },
         })

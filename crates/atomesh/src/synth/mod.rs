@@ -3,7 +3,7 @@
 //! A [`Scene`] is drawn in this order: its geometry from the seed, the grey of every sample from the
 //! geometry, blur, noise, rounding to bytes. Grey runs from 0 to 255 ([`grey`]). The geometry comes
 //! back as a [`Truth`], in the world coordinates of the image, so that a mesh can be compared with
-//! what was drawn and not with what was found.
+//! what was drawn instead of what was found.
 //!
 //! Lengths follow the image: positions and radii are shares of its box, lines are about three samples
 //! of the coarsest axis wide. The seed alone fixes the geometry, whatever the noise and blur are.
@@ -23,7 +23,7 @@ mod truth;
 mod tests;
 
 pub use layers::{Fold, Layers};
-pub use truth::{Feature, Geometry, Role, Truth};
+pub use truth::{Geometry, Role, TrueFeature, Truth};
 
 use crate::geometry::{Bounds, Point};
 use crate::image::{Frame, FrameError, Grid, Image, Units};
@@ -181,7 +181,7 @@ pub enum SynthError {
         /// The share given.
         value: f64,
     },
-    /// The blur is not a length.
+    /// The blur is negative, too great or not a number.
     #[error("blur {value} samples; expected at least 0 and at most {MOST_BLUR}")]
     Blur {
         /// The standard deviation given.
@@ -194,9 +194,9 @@ pub enum SynthError {
 
 /// The fewest samples along an axis: a line and its surroundings.
 const LEAST_COUNT: usize = 8;
-/// Beyond this nothing of the image is left.
+/// The greatest noise: beyond it nothing of the image is left.
 const MOST_NOISE: f64 = 100.0;
-/// Beyond this nothing of the image is left, and kernels grow long.
+/// The greatest blur: beyond it nothing of the image is left, and kernels grow long.
 const MOST_BLUR: f64 = 1000.0;
 
 /// How a scene is drawn.
@@ -247,7 +247,7 @@ pub struct Synthetic<const D: usize> {
     pub truth: Truth<D>,
 }
 
-/// The room that a scene has: its box and the step of its samples, in world units.
+/// What a scene is drawn on: its box and the steps of its samples, in world units.
 #[derive(Clone, Copy, Debug)]
 struct Canvas<const D: usize> {
     bounds: Bounds<D>,
@@ -280,7 +280,7 @@ impl<const D: usize> Canvas<D> {
         self.bounds.extent().into_iter().fold(f64::INFINITY, f64::min)
     }
 
-    /// How far from its middle a line's grey is the background's to the last bit.
+    /// The distance from its middle at which a line's grey is the background's to the last bit.
     fn line_reach(&self) -> f64 {
         1.25 * self.step * 9.0 // exp(−9²/2) is 3e-18, of 153 a thirtieth of a rounding
     }
@@ -295,9 +295,9 @@ impl<const D: usize> Canvas<D> {
 /// The grey at a point of the world.
 type Shade<const D: usize> = Box<dyn Fn(&Point<D>) -> f64 + Sync>;
 
-/// What a scene makes of its seed.
+/// A scene before it is sampled.
 struct Sketch<const D: usize> {
-    features: Vec<Feature<D>>,
+    features: Vec<TrueFeature<D>>,
     layers: Option<Layers<D>>,
     shade: Shade<D>,
 }

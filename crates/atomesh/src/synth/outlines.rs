@@ -1,7 +1,7 @@
 //! A bright disc or sphere.
 
 use super::random::Random;
-use super::truth::{Feature, Geometry, Role};
+use super::truth::{Geometry, Role, TrueFeature};
 use super::{Canvas, Sketch, grey};
 use crate::geometry::distance_squared;
 
@@ -11,7 +11,7 @@ pub(super) fn sketch<const D: usize>(canvas: &Canvas<D>, random: &mut Random) ->
     let radius = random.between(0.28, 0.36) * canvas.least_extent();
     let step = canvas.step;
     Sketch {
-        features: vec![Feature {
+        features: vec![TrueFeature {
             role: Role::Outline,
             geometry: Geometry::Sphere { center, radius },
         }],

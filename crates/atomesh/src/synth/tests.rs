@@ -61,9 +61,9 @@ fn dark_features_are_where_the_truth_says() {
         assert!((far - grey::BACKGROUND).abs() < 0.1, "{scene} {}: {far}", options.seed);
     }
     for seed in 0..5 {
-        let flat = SynthOptions { seed, ..SynthOptions::new([96, 80]) };
+        let plane = SynthOptions { seed, ..SynthOptions::new([96, 80]) };
         for scene in [Scene::Faults, Scene::Slit, Scene::SectionFaults] {
-            holds(scene, &flat);
+            holds(scene, &plane);
         }
         holds(Scene::LayersFaults, &SynthOptions { seed, ..SynthOptions::new([48, 40, 44]) });
     }
@@ -105,12 +105,12 @@ fn edges_are_where_the_truth_says() {
         assert_eq!(far, 0.0, "{scene} {}", options.seed);
     }
     for seed in 0..5 {
-        let flat = SynthOptions { seed, ..SynthOptions::new([64, 72]) };
-        holds(Scene::Disc, &flat);
-        holds(Scene::Grains, &flat);
-        let solid = SynthOptions { seed, ..SynthOptions::new([32, 36, 40]) };
-        holds(Scene::Sphere, &solid);
-        holds(Scene::Grains3, &solid);
+        let plane = SynthOptions { seed, ..SynthOptions::new([64, 72]) };
+        holds(Scene::Disc, &plane);
+        holds(Scene::Grains, &plane);
+        let space = SynthOptions { seed, ..SynthOptions::new([32, 36, 40]) };
+        holds(Scene::Sphere, &space);
+        holds(Scene::Grains3, &space);
     }
 }
 
@@ -206,11 +206,11 @@ fn the_same_options_give_the_same_bytes_at_any_thread_count() {
         let scenes = SCENES.iter().filter(|s| s.2 == D).map(|s| s.0);
         pool.install(|| scenes.map(|scene| made(scene, options).0).collect())
     }
-    let flat = SynthOptions { noise: 0.1, blur: 0.7, ..SynthOptions::new([97, 81]) };
-    let solid = SynthOptions { noise: 0.1, blur: 0.7, ..SynthOptions::new([31, 27, 23]) };
-    assert_eq!(bytes(&flat, 1), bytes(&flat, 3));
-    assert_eq!(bytes(&solid, 1), bytes(&solid, 3));
-    for (a, b) in bytes(&flat, 1).iter().zip(bytes(&SynthOptions { seed: 1, ..flat }, 1)) {
+    let plane = SynthOptions { noise: 0.1, blur: 0.7, ..SynthOptions::new([97, 81]) };
+    let space = SynthOptions { noise: 0.1, blur: 0.7, ..SynthOptions::new([31, 27, 23]) };
+    assert_eq!(bytes(&plane, 1), bytes(&plane, 3));
+    assert_eq!(bytes(&space, 1), bytes(&space, 3));
+    for (a, b) in bytes(&plane, 1).iter().zip(bytes(&SynthOptions { seed: 1, ..plane }, 1)) {
         assert_ne!(*a, b);
     }
 }
@@ -382,10 +382,10 @@ proptest! {
         bytes in any::<bool>(),
     ) {
         let shape2 = [2 * shape[0], shape[1]];
-        let flat = SynthOptions { shape: shape2, spacing: [spacing[0], spacing[1]], seed, noise, blur, bytes: false };
-        let solid = SynthOptions { shape, spacing, seed, noise, blur: blur.min(2.0), bytes };
+        let plane = SynthOptions { shape: shape2, spacing: [spacing[0], spacing[1]], seed, noise, blur, bytes: false };
+        let space = SynthOptions { shape, spacing, seed, noise, blur: blur.min(2.0), bytes };
         for &(scene, _, dimension) in &SCENES {
-            if dimension == 2 { sound(scene, &flat) } else { sound(scene, &solid) }
+            if dimension == 2 { sound(scene, &plane) } else { sound(scene, &space) }
         }
     }
 }

@@ -108,7 +108,7 @@ fn boundary_distance<const D: usize>(p: &Point<D>, centers: &[Point<D>]) -> f64 
 
 /// One feature of an image.
 #[derive(Clone, Debug, PartialEq)]
-pub struct Feature<const D: usize> {
+pub struct TrueFeature<const D: usize> {
     /// What it stands for.
     pub role: Role,
     /// Where it is.
@@ -127,7 +127,7 @@ pub struct Truth<const D: usize> {
     /// The image's samples; sample 0 is at the world's origin.
     pub grid: Grid<D>,
     /// What the image shows, at least one feature.
-    pub features: Vec<Feature<D>>,
+    pub features: Vec<TrueFeature<D>>,
     /// The layers that were drawn or that the faults cut, in scenes that have them.
     pub layers: Option<Layers<D>>,
 }
@@ -148,7 +148,7 @@ impl<const D: usize> Serialize for Rows<'_, D> {
     }
 }
 
-impl<const D: usize> Serialize for Feature<D> {
+impl<const D: usize> Serialize for TrueFeature<D> {
     fn serialize<S: Serializer>(&self, serializer: S) -> Result<S::Ok, S::Error> {
         let mut map = serializer.serialize_map(None)?;
         map.serialize_entry("role", &self.role)?;

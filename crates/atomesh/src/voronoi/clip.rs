@@ -78,17 +78,11 @@ struct Cutter<'a, const D: usize> {
 }
 
 impl<const D: usize> Cutter<'_, D> {
-    /// The coordinate of a side along its axis.
-    fn level(&self, side: usize) -> f64 {
-        let bounds = &self.domain.bounds;
-        if side.is_multiple_of(2) { bounds.min[side / 2] } else { bounds.max[side / 2] }
-    }
-
     fn state(&self, point: u32, side: usize) -> State {
         if self.sides[point as usize] >> side & 1 == 1 {
             return State::On;
         }
-        let above = self.points[point as usize][side / 2] - self.level(side);
+        let above = self.points[point as usize][side / 2] - self.domain.bounds.level(side);
         let beyond = if side.is_multiple_of(2) { -above } else { above };
         match beyond {
             b if b > self.domain.tolerance => State::Beyond,
@@ -110,7 +104,7 @@ impl<const D: usize> Cutter<'_, D> {
             }
             for &corner in &rim.corners {
                 if self.state(corner, side) == State::On {
-                    self.points[corner as usize][side / 2] = self.level(side);
+                    self.points[corner as usize][side / 2] = self.domain.bounds.level(side);
                     self.sides[corner as usize] |= 1 << side;
                 }
             }
@@ -152,7 +146,7 @@ impl<const D: usize> Cutter<'_, D> {
     /// outside is scaled down with the distance.
     fn cross(&mut self, inside: u32, beyond: u32, side: usize) -> u32 {
         let (from, to) = (self.points[inside as usize], self.points[beyond as usize]);
-        let (axis, level) = (side / 2, self.level(side));
+        let (axis, level) = (side / 2, self.domain.bounds.level(side));
         let share = (level - from[axis]) / (to[axis] - from[axis]);
         let mut point: Point<D> = std::array::from_fn(|k| from[k] + share * (to[k] - from[k]));
         point[axis] = level;

@@ -351,7 +351,7 @@ fn sheet<const D: usize>(side: usize, height: f64, width: f64) -> ScalarField<D>
         (-0.5 * s * s).exp() as f32
     };
     let samples = (0..(side + 1).pow(D as u32)).map(value).collect();
-    ScalarField::new(grid, samples, Default::default()).unwrap()
+    ScalarField::potential(grid, samples, Default::default()).unwrap()
 }
 
 fn faces_lie_along_features<const D: usize>()

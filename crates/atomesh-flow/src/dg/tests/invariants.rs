@@ -10,14 +10,14 @@ use rand_pcg::Pcg64;
 use super::super::*;
 use super::SCHEMES;
 use super::linear::random_tensor;
-use crate::grid::Grid;
+use crate::grid::FlowGrid;
 use crate::permeability::Permeability;
 use crate::problem::{Barrier, Boundary, Condition, Control, Problem, Value, Well};
 use crate::solve::Sparse;
 use crate::test_meshes::{grid as grid_of, name_inner_facets, unit_box};
 
 /// Pressure on one side, a well of given pressure, a partly sealing and a sealing wall, and a tensor for each cell.
-fn everything<'a, const D: usize>(grid: &mut Grid<D>) -> Problem<'a, D> {
+fn everything<'a, const D: usize>(grid: &mut FlowGrid<D>) -> Problem<'a, D> {
     name_inner_facets(grid, "partly", |x| x[0] < 0.45);
     name_inner_facets(grid, "sealed", |x| x[0] > 0.6 && x[1] > 0.6);
     let barrier = |group: &str, multiplier: f64| Barrier { group: group.to_string(), multiplier };
@@ -39,7 +39,11 @@ fn everything<'a, const D: usize>(grid: &mut Grid<D>) -> Problem<'a, D> {
     }
 }
 
-fn matrix<const D: usize>(grid: &Grid<D>, setting: &Setting<'_, D>, options: &DgOptions) -> Sparse {
+fn matrix<const D: usize>(
+    grid: &FlowGrid<D>,
+    setting: &Setting<'_, D>,
+    options: &DgOptions,
+) -> Sparse {
     let scheme = Scheme::new(grid, setting, options).unwrap();
     assemble::matrix(&scheme, &mut Silent).unwrap()
 }
@@ -179,7 +183,7 @@ fn a_constant_pressure_makes_no_flow_at_all() {
 }
 
 /// The pressures of a flow from the side to the well, on a mesh `size` times as large.
-fn pressures<const D: usize>(grid: &Grid<D>, size: f64) -> Vec<f64> {
+fn pressures<const D: usize>(grid: &FlowGrid<D>, size: f64) -> Vec<f64> {
     let mesh = grid.mesh().unwrap();
     let points = mesh.points().iter().map(|x| x.map(|x| size * x)).collect();
     let grid = grid_of(&Mesh::new(points, mesh.corners().to_vec()).unwrap(), Vec::new());
@@ -312,7 +316,7 @@ fn voronoi_cells_are_refused() {
     let bounds = Bounds { min: [0.0; 2], max: [1.0; 2] };
     let sites = [[0.2, 0.3], [0.7, 0.6]];
     let cells = voronoi(&Delaunay::<2>::new(), &sites, bounds, &mut Silent).unwrap();
-    let grid = Grid::of_cells(&cells, None);
+    let grid = FlowGrid::of_cells(&cells, None);
     let problem = Problem::default();
     let setting = Setting::new(&problem, &grid).unwrap();
     let error = solve(&grid, &setting, &DgOptions::default(), &mut Silent).unwrap_err();

@@ -6,7 +6,7 @@ use atomesh::watch::Silent;
 
 use super::super::*;
 use super::SCHEMES;
-use crate::grid::Grid;
+use crate::grid::FlowGrid;
 use crate::permeability::{Permeability, Tensor};
 use crate::problem::{Barrier, Boundary, Condition, Problem, Value};
 use crate::test_meshes::{connect, jittered_points, name_inner_facets};
@@ -21,7 +21,7 @@ fn height(x: &Point<2>) -> f64 {
 
 /// A mesh of the unit square with edges along both lines: points between them would not be Delaunay's if they were
 /// nearer to a line than those along it are to each other, so the layer has none of its own.
-fn aligned() -> Grid<2> {
+fn aligned() -> FlowGrid<2> {
     let bounds = Bounds { min: [0.0; 2], max: [1.0; 2] };
     let mut points = jittered_points(&bounds, [12, 12], 0.25, 3);
     let lines = [0.0, 0.05];
@@ -44,7 +44,7 @@ fn aligned() -> Grid<2> {
     grid
 }
 
-fn is_exact(grid: &Grid<2>, k: Vec<Tensor<2>>, exact: &(dyn Fn(&Point<2>) -> f64 + Sync)) {
+fn is_exact(grid: &FlowGrid<2>, k: Vec<Tensor<2>>, exact: &(dyn Fn(&Point<2>) -> f64 + Sync)) {
     let sides = ["xmin", "xmax", "ymin", "ymax"];
     let boundary = |side: &str| Boundary {
         group: side.to_string(),
@@ -98,7 +98,7 @@ fn the_oblique_barrier_is_exact() {
 }
 
 /// A strip of length 2 and height 1, the wall at x = 1 along edges.
-fn strip() -> Grid<2> {
+fn strip() -> FlowGrid<2> {
     let bounds = Bounds { min: [0.0; 2], max: [2.0, 1.0] };
     let mut points = jittered_points(&bounds, [12, 6], 0.25, 9);
     for point in points.iter_mut().filter(|x| (x[0] - 1.0).abs() < 0.05) {
@@ -110,7 +110,7 @@ fn strip() -> Grid<2> {
     grid
 }
 
-fn across(grid: &Grid<2>, multiplier: f64, scheme: (Form, usize)) -> DgSolution<2> {
+fn across(grid: &FlowGrid<2>, multiplier: f64, scheme: (Form, usize)) -> DgSolution<2> {
     let fixed = |group: &str, pressure: f64| Boundary {
         group: group.to_string(),
         condition: Condition::Pressure(Value::Constant(pressure)),
@@ -132,7 +132,7 @@ fn across(grid: &Grid<2>, multiplier: f64, scheme: (Form, usize)) -> DgSolution<
 }
 
 /// What flows through the strip.
-fn through(grid: &Grid<2>, answer: &DgSolution<2>) -> f64 {
+fn through(grid: &FlowGrid<2>, answer: &DgSolution<2>) -> f64 {
     let inlet = &grid.sets()[0].facets;
     -inlet.iter().map(|&facet| answer.solution.fluxes[facet as usize]).sum::<f64>()
 }

@@ -8,14 +8,14 @@ use atomesh::watch::Silent;
 
 use super::super::*;
 use super::SCHEMES;
-use crate::grid::Grid;
+use crate::grid::FlowGrid;
 use crate::problem::{Barrier, Boundary, Condition, Control, Problem, Value, Well};
 use crate::test_meshes::{connect, jittered_points, name_inner_facets, unit_box};
 
 const STEPS: usize = 24;
 
 /// A well in the middle of the cell that holds a place.
-fn well(grid: &Grid<2>, near: Point<2>, control: Control) -> Well<2> {
+fn well(grid: &FlowGrid<2>, near: Point<2>, control: Control) -> Well<2> {
     let cell = grid.cells_at(&near)[0] as usize;
     Well { name: "well".to_string(), place: grid.centroids()[cell], control, radius: Some(1e-4) }
 }
@@ -38,7 +38,7 @@ fn fixed<'a>(
 
 /// The relative error beyond three cells' size of the well.
 fn error_away(
-    grid: &Grid<2>,
+    grid: &FlowGrid<2>,
     answer: &DgSolution<2>,
     well: &Point<2>,
     exact: impl Fn(&Point<2>) -> f64,

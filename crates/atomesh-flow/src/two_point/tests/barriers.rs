@@ -10,7 +10,7 @@ fn beside_a_fault(step: f64) -> [f64; 2] {
     let count = (8.0 / step).round() as usize;
     let sites = lattice([-4.0 + 0.5 * step; 2], step, [count; 2]);
     let cells = cells_of(&sites, Bounds { min: [-4.0; 2], max: [4.0; 2] });
-    let mut grid = Grid::of_cells(&cells, None);
+    let mut grid = FlowGrid::of_cells(&cells, None);
     assert_eq!(name_faces(&mut grid, "fault", |f| f.centroid[0].abs() < 1e-9), count);
     let place = [2.0 + 0.5 * step, 0.5 * step];
     let squared = |p: &Point<2>, x: f64| (p[0] - x).powi(2) + (p[1] - place[1]).powi(2);
@@ -74,7 +74,7 @@ fn around_the_slit(levels: usize) -> Vec<Point<2>> {
 /// p = −Im √(z² − 1) jumps by 2 √(1 − x²).
 fn jump_error(levels: usize) -> f64 {
     let cells = cells_of(&around_the_slit(levels), Bounds { min: [-2.0; 2], max: [2.0; 2] });
-    let mut grid = Grid::of_cells(&cells, None);
+    let mut grid = FlowGrid::of_cells(&cells, None);
     let on_slit = |p: &Point<2>| p[1].abs() < 1e-9 && p[0].abs() < 1.0;
     let length = |f: &crate::grid::FlowFacet<2>| f.measure();
     name_faces(&mut grid, "slit", |f| on_slit(&f.centroid));

@@ -34,7 +34,7 @@ fn a_linear_pressure_is_exact_on<const D: usize>(
     cells: &PolyMesh<D>,
     is_told: impl Fn(usize) -> bool,
 ) {
-    let grid = Grid::of_cells(cells, None);
+    let grid = FlowGrid::of_cells(cells, None);
     let problem = Problem {
         permeability: Permeability::Uniform(2.5),
         boundaries: all_sides(&linear),
@@ -66,7 +66,7 @@ fn layers_normal_to_the_flow_are_exact() {
     // ten columns of cubes, each with its own k; the resistances of the columns add
     let sites = lattice([0.05; 3], 0.1, [10, 3, 2]);
     let cells = cells_of(&sites, Bounds { min: [0.0; 3], max: [1.0, 0.3, 0.2] });
-    let grid = Grid::of_cells(&cells, None);
+    let grid = FlowGrid::of_cells(&cells, None);
     let k: Vec<f64> = (0..10).map(|n| 10.0_f64.powi(n % 5 - 2)).collect();
     let column = |site: &Point<3>| (site[0] / 0.1) as usize;
     let problem = Problem {
@@ -90,7 +90,7 @@ fn a_multiplier_jumps_by_its_resistance() {
     // k 2 left of x = 0.5, k 1 to the right; the face's own resistance is m⁻¹ times that between the two sites
     let sites = lattice([0.05, 0.05], 0.1, [10, 4]);
     let cells = cells_of(&sites, Bounds { min: [0.0; 2], max: [1.0, 0.4] });
-    let mut grid = Grid::of_cells(&cells, None);
+    let mut grid = FlowGrid::of_cells(&cells, None);
     assert_eq!(name_faces(&mut grid, "fault", |f| (f.centroid[0] - 0.5).abs() < 1e-9), 4);
     let number = |x: f64| if x < 0.5 { 2.0 } else { 1.0 };
     for multiplier in [0.0, 0.01, 0.5, 1.0] {
@@ -119,7 +119,7 @@ fn a_flux_on_a_side_and_a_source_are_exact_in_one_dimension() {
     // at the ends, since sites lie on the sides.
     let sites = lattice([0.0, 0.0], 0.125, [9, 2]);
     let cells = cells_of(&sites, Bounds { min: [0.0; 2], max: [1.0, 0.125] });
-    let grid = Grid::of_cells(&cells, None);
+    let grid = FlowGrid::of_cells(&cells, None);
     let inflow = Condition::Flux(Value::Constant(3.0));
     let problem = Problem {
         source: Some(Value::Constant(2.0)),
@@ -155,7 +155,7 @@ fn an_oblique_barrier_is_exact_where_faces_follow_it() {
     };
     let sites = beside_lines(slope, 0.05);
     let cells = cells_of(&sites, cube(1.0));
-    let grid = Grid::of_cells(&cells, None);
+    let grid = FlowGrid::of_cells(&cells, None);
     let mut crossings = 0;
     for facet in &grid.facets()[..cells.inner_face_count()] {
         let (a, b) = (facet.cell, facet.neighbour.unwrap());
@@ -194,7 +194,7 @@ fn beside_lines(slope: f64, height: f64) -> Vec<Point<2>> {
 #[test]
 fn a_tensor_is_refused_with_a_way_out() {
     let cells = cells_of(&lattice([0.25; 2], 0.5, [2, 2]), cube(1.0));
-    let grid = Grid::of_cells(&cells, None);
+    let grid = FlowGrid::of_cells(&cells, None);
     let permeability = Permeability::UniformTensor([[1.0, 0.0], [0.0, 1.0]]);
     let problem = Problem { permeability, ..Problem::default() };
     let setting = Setting::new(&problem, &grid).unwrap();
@@ -208,7 +208,7 @@ fn cells_that_a_frame_has_sheared_are_refused() {
     let cells = cells_of(&scattered::<2>(40, 1), cube(1.0));
     let problem = Problem::default();
     let fails = |cells: &PolyMesh<2>| {
-        let grid = Grid::of_cells(cells, None);
+        let grid = FlowGrid::of_cells(cells, None);
         let setting = Setting::new(&problem, &grid).unwrap();
         solve(cells, &grid, &setting, &SolveOptions::default(), &mut Silent).is_err()
     };
@@ -221,7 +221,7 @@ fn cells_that_a_frame_has_sheared_are_refused() {
 fn cells_without_a_pressure_are_pinned() {
     // sealed at x = 1/2: a well that feeds a side on the left, nothing on the right
     let cells = cells_of(&lattice([0.125; 2], 0.25, [4, 4]), cube(1.0));
-    let mut grid = Grid::of_cells(&cells, None);
+    let mut grid = FlowGrid::of_cells(&cells, None);
     name_faces(&mut grid, "fault", |f| (f.centroid[0] - 0.5).abs() < 1e-9);
     let problem = Problem {
         wells: vec![well([0.4, 0.4], Control::Rate(1.0), None)],
@@ -239,7 +239,7 @@ fn cells_without_a_pressure_are_pinned() {
 #[test]
 fn rates_that_balance_need_no_pressure() {
     let cells = cells_of(&scattered::<2>(60, 3), cube(1.0));
-    let grid = Grid::of_cells(&cells, None);
+    let grid = FlowGrid::of_cells(&cells, None);
     let wells = [([0.2, 0.2], 1.5), ([0.8, 0.3], -0.5), ([0.7, 0.9], -1.0)];
     let wells = wells.map(|(place, rate)| well(place, Control::Rate(rate), None)).to_vec();
     let found = answer(&cells, &grid, &Problem { wells, ..Problem::default() });
@@ -251,7 +251,7 @@ fn rates_that_balance_need_no_pressure() {
 #[test]
 fn a_site_on_two_sides_obeys_the_one_named_last() {
     let cells = cells_of(&lattice([0.0; 2], 0.5, [3, 3]), cube(1.0));
-    let grid = Grid::of_cells(&cells, None);
+    let grid = FlowGrid::of_cells(&cells, None);
     let (left, low) = (pressure_on("xmin", 1.0), pressure_on("ymin", 2.0));
     let corner = |boundaries| {
         let problem = Problem { boundaries, ..Problem::default() };

@@ -96,7 +96,7 @@ fn well<const D: usize>(place: Point<D>, control: Control, radius: Option<f64>) 
 
 /// Names the faces inside the box whose centroids the test chooses.
 fn name_faces<const D: usize>(
-    grid: &mut Grid<D>,
+    grid: &mut FlowGrid<D>,
     name: &str,
     chosen: impl Fn(&crate::grid::FlowFacet<D>) -> bool,
 ) -> usize {
@@ -110,7 +110,7 @@ fn name_faces<const D: usize>(
 /// Solves, and checks what holds of every answer: mass balances, and barriers leak nothing.
 fn answer<const D: usize>(
     cells: &PolyMesh<D>,
-    grid: &Grid<D>,
+    grid: &FlowGrid<D>,
     problem: &Problem<'_, D>,
 ) -> Solution<D> {
     let setting = Setting::new(problem, grid).unwrap();

@@ -23,7 +23,7 @@ where
     Axes: Dimension<D>,
 {
     let cells = cells_of(sites, bounds);
-    let grid = Grid::of_cells(&cells, None);
+    let grid = FlowGrid::of_cells(&cells, None);
     let exact = |p: &Point<D>| free(p, &place);
     let problem = Problem {
         wells: vec![well(place, Control::Rate(1.0), None)],
@@ -84,7 +84,7 @@ where
     Axes: Dimension<D>,
 {
     let cells = cells_of(sites, bounds);
-    let cell = Grid::of_cells(&cells, None).cells_at(&place)[0];
+    let cell = FlowGrid::of_cells(&cells, None).cells_at(&place)[0];
     equivalent_radius(&cells, cell as usize, rings).unwrap()
 }
 
@@ -137,7 +137,7 @@ fn on_a_side_or_in_a_corner_a_well_has_the_radius_that_it_has_inside() {
 /// Muskat's constant from wall pressures: Δp πk/Q = ln(d/r_w) − C, d the distance of the wells of opposite sign.
 fn five_spot(sites: &[Point<2>]) -> f64 {
     let cells = cells_of(sites, cube(1.0));
-    let grid = Grid::of_cells(&cells, None);
+    let grid = FlowGrid::of_cells(&cells, None);
     let wall = Some(1e-4);
     let wells = [([0.0; 2], 0.25), ([1.0; 2], -0.25)];
     let wells = wells.map(|(place, rate)| well(place, Control::Rate(rate), wall)).to_vec();
@@ -176,7 +176,7 @@ fn a_well_of_given_pressure_brings_what_its_radius_lets_through() {
     // the well's own field: between wall and sides 2π/ln(r/r_w) for each unit of pressure
     let (sites, bounds, place) = squares::<2>(10);
     let cells = cells_of(&sites, bounds);
-    let grid = Grid::of_cells(&cells, None);
+    let grid = FlowGrid::of_cells(&cells, None);
     let exact = |p: &Point<2>| free(p, &place);
     let wall = free(&[place[0] + 1e-3, place[1]], &place);
     let problem = Problem {

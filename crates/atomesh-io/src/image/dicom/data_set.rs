@@ -1,15 +1,15 @@
 //! The elements of a DICOM file that an image needs, and where its pixel data are.
 //!
 //! Definition: PS3.5 (data structures and encoding) and PS3.10 (file format). Explicit and implicit
-//! value representations are read, with either byte first. Whatever is not wanted is skipped without
-//! being held, sequences with their nested items too.
+//! value representations are read, in either byte order. All other elements are skipped without being held,
+//! sequences with their nested items too.
 
 use std::io::{BufReader, ErrorKind, Read, Seek, SeekFrom};
 
 use super::super::affine::wrong;
-use super::super::{ByteOrder, ImageFormat, ReadReason};
-
-const FORMAT: ImageFormat = ImageFormat::Dicom;
+use super::super::error::ReadReason;
+use super::super::sample_type::ByteOrder;
+use super::FORMAT;
 
 /// The longest value that is held; the wanted ones are short.
 const LONGEST_VALUE: u32 = 1 << 12;
@@ -70,8 +70,16 @@ pub(super) mod tag {
 pub(super) struct DataSet {
     elements: Vec<(u32, Vec<u8>)>,
     pub byte_order: ByteOrder,
-    /// Where the value of the pixel data begins, and its length, if that is stated.
-    pub pixels: Option<(u64, Option<u32>)>,
+    pub pixels: Option<PixelData>,
+}
+
+/// Where pixel data are in a file.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(super) struct PixelData {
+    /// Their first byte.
+    pub start: u64,
+    /// Their number of bytes; none if they are packed in fragments.
+    pub length: Option<u32>,
 }
 
 impl DataSet {
@@ -150,7 +158,7 @@ impl<R: Read + Seek> Reader<R> {
     pub fn read(&mut self) -> Result<DataSet, ReadReason> {
         let start = self.take::<132>()?;
         if !start.ends_with(b"DICM") {
-            return Err(ReadReason::Magic { format: FORMAT, found: start[..8].into() });
+            return Err(ReadReason::Magic { format: FORMAT, found: start[..8].into(), like: None });
         }
         let mut set = DataSet { elements: Vec::new(), byte_order: ByteOrder::Little, pixels: None };
         let mut is_meta = true;
@@ -163,7 +171,7 @@ impl<R: Read + Seek> Reader<R> {
             let head = self.head()?;
             if head.tag == tag::PIXELS {
                 let length = Some(head.length).filter(|&length| length != UNDEFINED);
-                set.pixels = Some((self.at, length));
+                set.pixels = Some(PixelData { start: self.at, length });
                 break;
             }
             if head.length != UNDEFINED && tag::WANTED.contains(&head.tag) && &head.kind != b"SQ" {

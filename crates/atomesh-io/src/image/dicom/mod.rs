@@ -1,8 +1,8 @@
 //! DICOM: a folder with the slices of one series, or a single slice.
 //!
-//! Files are known by their magic word, whatever they are called; what is no image (reports, a
-//! `DICOMDIR`) is passed over. All images of a folder must be of one series, alike, and evenly spaced:
-//! what is mixed, missing or double is an error that names files and values. World coordinates are LPS
+//! Files are known by their magic word, whatever their names are. Files without an image (reports, a
+//! `DICOMDIR`) are ignored. All images of a folder must be of one series, alike, and evenly spaced:
+//! mixed, missing or duplicate slices are errors that name files and values. World coordinates are LPS
 //! in the files and are turned to RAS, as NIfTI's are. Samples are those that are stored, or, with a
 //! rescale slope and intercept (Hounsfield units), single precision; where the least value is white
 //! (MONOCHROME1) they are turned round first. A single slice is a flat image; its frame is kept if the
@@ -13,15 +13,16 @@
 //! has more of it brings some 50 others, an unmaintained one among them.
 
 use std::fs::{self, File};
-use std::io::{Read, Seek};
 use std::path::Path;
 
 use atomesh::image::Samples;
 use atomesh::watch::{Phase, Watch, check};
 
 use super::affine::{self, Affine, World};
-use super::watched::Watched;
-use super::{ImageFormat, LoadedImage, ReadReason};
+use super::codec::{Codec, Folder, Source};
+use super::error::ReadReason;
+use super::format::ImageFormat;
+use super::note::LoadedImage;
 
 mod data_set;
 mod series;
@@ -29,22 +30,27 @@ mod slice;
 
 use data_set::Reader;
 use series::Series;
-pub use series::SeriesError;
-use slice::{Pixels, Slice};
+use slice::{Pixels, Scale, Slice};
 
-const FORMAT: ImageFormat = ImageFormat::Dicom;
+const FORMAT: ImageFormat = ImageFormat::named("DICOM");
+
+/// The magic word comes after 128 bytes of anything; the reader looks for it.
+pub(super) const CODEC: Codec = Codec {
+    endings: &[".dcm"],
+    has_frame: true,
+    z_is_height: true,
+    folder: Some(Folder { is_part: is_dicom, read: read_folder }),
+    ..Codec::reading(FORMAT, read)
+};
 
 /// Whether the file at a path begins as DICOM files do.
-pub(super) fn is_dicom(path: &Path) -> bool {
+fn is_dicom(path: &Path) -> bool {
     File::open(path).is_ok_and(|mut file| data_set::is_dicom(&mut file))
 }
 
 /// Reads a file with a single slice.
-pub(super) fn read<R: Read + Seek>(
-    source: Watched<R>,
-    file_bytes: u64,
-) -> Result<LoadedImage, ReadReason> {
-    let mut reader = Reader::new(source, file_bytes);
+fn read(source: Source) -> Result<LoadedImage, ReadReason> {
+    let mut reader = Reader::new(source.bytes, source.length);
     let slice = Slice::read(&mut reader)?.ok_or_else(|| ReadReason::Unsupported {
         format: FORMAT,
         found: "no image".into(),
@@ -61,7 +67,7 @@ pub(super) fn read<R: Read + Seek>(
 }
 
 /// Reads the slices in a folder.
-pub(super) fn read_folder(folder: &Path, watch: &mut dyn Watch) -> Result<LoadedImage, ReadReason> {
+fn read_folder(folder: &Path, watch: &mut dyn Watch) -> Result<LoadedImage, ReadReason> {
     let mut names = Vec::new();
     for entry in fs::read_dir(folder).map_err(ReadReason::Io)? {
         let entry = entry.map_err(ReadReason::Io)?;
@@ -123,7 +129,7 @@ fn open(path: &Path) -> Result<Reader<File>, ReadReason> {
     Ok(Reader::new(file, bytes))
 }
 
-/// The header of a slice; none if the file is no DICOM file, or holds no image.
+/// The header of a slice; none if the file is not DICOM, or holds no image.
 fn header(path: &Path) -> Result<Option<Slice>, ReadReason> {
     if is_dicom(path) { Slice::read(&mut open(path)?) } else { Ok(None) }
 }
@@ -148,7 +154,7 @@ impl Volume {
     /// Room for `count` samples, in the least type that holds the stored ones, or in single precision
     /// if they are rescaled.
     fn new(pixels: &Pixels, is_plain: bool, count: usize) -> Result<Self, ReadReason> {
-        let samples = match (is_plain, pixels.bits.1, pixels.is_signed) {
+        let samples = match (is_plain, pixels.stored, pixels.is_signed) {
             (false, ..) => Samples::F32(room(count)?),
             (_, ..9, false) => Samples::U8(room(count)?),
             (_, ..9, true) => Samples::I8(room(count)?),
@@ -161,14 +167,14 @@ impl Volume {
     }
 
     /// Appends the samples of a slice.
-    fn append(&mut self, values: &[i64], (slope, intercept): (f64, f64)) {
+    fn append(&mut self, values: &[i64], scale: Scale) {
         /// Appends with one function for each type of integers.
         macro_rules! append_as {
             ($($kind:ident $number:ty),*) => {
                 match &mut self.samples {
                     $(Samples::$kind(v) => v.extend(values.iter().map(|&x| x as $number)),)*
                     Samples::F32(v) => {
-                        v.extend(values.iter().map(|&x| (x as f64 * slope + intercept) as f32));
+                        v.extend(values.iter().map(|&x| scale.of(x)));
                     }
                     _ => {} // no other is made
                 }

@@ -3,10 +3,10 @@
 use std::io::{Read, Seek};
 
 use super::super::affine::{Affine, World, wrong};
-use super::super::{ByteOrder, ImageFormat, ReadReason};
-use super::data_set::{DataSet, Reader, tag};
-
-const FORMAT: ImageFormat = ImageFormat::Dicom;
+use super::super::error::ReadReason;
+use super::super::sample_type::ByteOrder;
+use super::FORMAT;
+use super::data_set::{DataSet, PixelData, Reader, tag};
 
 /// The most bytes that a byte of a run can stand for.
 const RUN_RATIO: u64 = 64;
@@ -16,8 +16,10 @@ const RUN_RATIO: u64 = 64;
 pub(super) struct Pixels {
     /// Samples along x and y.
     pub shape: [usize; 2],
-    /// Bits that a sample takes, and bits of these that count.
-    pub bits: (u16, u16),
+    /// Bits that a sample takes.
+    pub allocated: u16,
+    /// The lowest bits of these, which count.
+    pub stored: u16,
     pub is_signed: bool,
     /// Whether the least value is white.
     pub is_inverted: bool,
@@ -34,11 +36,24 @@ pub(super) struct Slice {
     pub position: Option<[f64; 3]>,
     /// The directions of x and y there.
     pub axes: Option<[[f64; 3]; 2]>,
-    /// Slope and intercept.
-    pub scale: (f64, f64),
+    pub scale: Scale,
     byte_order: ByteOrder,
     is_run_length: bool,
-    place: (u64, Option<u32>),
+    place: PixelData,
+}
+
+/// What stored numbers are rescaled by.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub(super) struct Scale {
+    slope: f64,
+    intercept: f64,
+}
+
+impl Scale {
+    /// The value of a stored number, in single precision.
+    pub fn of(&self, stored: i64) -> f32 {
+        (stored as f64 * self.slope + self.intercept) as f32
+    }
 }
 
 fn unsupported(found: impl Into<String>, expected: &'static str) -> ReadReason {
@@ -71,7 +86,7 @@ impl Slice {
             spacing,
             position: set.decimals(tag::POSITION, "image position (patient)")?,
             axes: axes.map(|[a, b, c, d, e, f]| [[a, b, c], [d, e, f]]),
-            scale: (slope, intercept),
+            scale: Scale { slope, intercept },
             byte_order: set.byte_order,
             is_run_length,
             place,
@@ -82,7 +97,7 @@ impl Slice {
 
     /// Whether the samples are numbers as they are stored.
     pub fn is_plain(&self) -> bool {
-        self.scale == (1.0, 0.0)
+        self.scale == Scale { slope: 1.0, intercept: 0.0 }
     }
 
     /// Sample indices to our world, with the given step from slice to slice.
@@ -96,7 +111,7 @@ impl Slice {
 
     /// Checks that a file of `file_bytes` bytes can hold the samples.
     fn check_size(&self, file_bytes: u64) -> Result<(), ReadReason> {
-        let (start, length) = self.place;
+        let PixelData { start, length } = self.place;
         let there = file_bytes.saturating_sub(start);
         let there = length.map_or(there, |length| there.min(length.into()));
         let ratio = if self.is_run_length { RUN_RATIO } else { 1 };
@@ -111,10 +126,10 @@ impl Slice {
         let size = self.pixels.size();
         let whole = self.pixels.shape[0] * self.pixels.shape[1] * size;
         let (bytes, byte_order) = match self.place {
-            (start, None) if self.is_run_length => {
+            PixelData { start, length: None } if self.is_run_length => {
                 (unpack_runs(&reader.fragments(start)?, whole, size)?, ByteOrder::Little)
             }
-            (start, Some(_)) if !self.is_run_length => {
+            PixelData { start, length: Some(_) } if !self.is_run_length => {
                 (reader.pixel_bytes(start, whole as u64)?, self.byte_order)
             }
             _ => return Err(wrong(FORMAT, "pixel data", "packed otherwise", "as the syntax says")),
@@ -135,12 +150,12 @@ impl Slice {
 impl Pixels {
     /// The bytes of a sample.
     fn size(&self) -> usize {
-        usize::from(self.bits.0) / 8
+        usize::from(self.allocated) / 8
     }
 
     /// Type and shade for a message.
     pub fn text(&self) -> String {
-        let Self { bits: (allocated, stored), is_signed, is_inverted, .. } = self;
+        let Self { allocated, stored, is_signed, is_inverted, .. } = self;
         let sign = if *is_signed { "signed" } else { "unsigned" };
         let white = if *is_inverted { "least" } else { "greatest" };
         format!("{stored} of {allocated} bits, {sign}, the {white} white")
@@ -149,7 +164,7 @@ impl Pixels {
     /// The value of stored bits.
     fn value(&self, number: u64) -> i64 {
         // bits beyond those that count held drawings in old files
-        let unused = 64 - u32::from(self.bits.1);
+        let unused = 64 - u32::from(self.stored);
         let value = match self.is_signed {
             true => ((number << unused) as i64) >> unused,
             false => (number << unused >> unused) as i64,
@@ -157,7 +172,7 @@ impl Pixels {
         match (self.is_inverted, self.is_signed) {
             (false, _) => value,
             (true, true) => -1 - value,
-            (true, false) => (1 << self.bits.1) - 1 - value,
+            (true, false) => (1 << self.stored) - 1 - value,
         }
     }
 }
@@ -188,7 +203,8 @@ fn pixels(set: &DataSet, shape: [u16; 2]) -> Result<Pixels, ReadReason> {
     }
     Ok(Pixels {
         shape: shape.map(usize::from),
-        bits: (allocated, stored),
+        allocated,
+        stored,
         is_signed: set.short(tag::IS_SIGNED) == Some(1),
         is_inverted,
     })
@@ -286,7 +302,8 @@ mod tests {
     fn stored_bits_become_values_of_either_sign_and_shade() {
         let of = |stored, is_signed, is_inverted| Pixels {
             shape: [1, 1],
-            bits: (16, stored),
+            allocated: 16,
+            stored,
             is_signed,
             is_inverted,
         };

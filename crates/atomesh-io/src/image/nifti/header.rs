@@ -2,21 +2,22 @@
 
 use std::io::Read;
 
-use atomesh::image::Frame;
-
-use super::super::affine::{self, Affine};
-use super::super::stream;
-use super::super::{ByteOrder, ImageFormat, ReadReason, SampleType, WriteReason};
+use super::super::affine::Affine;
+use super::super::error::ReadReason;
+use super::super::sample_type::{ByteOrder, SampleType};
+use super::super::{spelling, stream};
+use super::FORMAT;
+use super::quaternion::rotation;
 
 /// The bytes of a header.
 pub(super) const BYTES: usize = 348;
 
 /// Where the samples of a single file begin at the earliest: the header and four bytes that say
 /// whether extensions follow.
-const FIRST_SAMPLE: u64 = 352;
+pub(super) const FIRST_SAMPLE: u64 = 352;
 
 /// Where the entries that are used stand in the header, in bytes.
-mod at {
+pub(super) mod at {
     pub const DIM: usize = 40;
     pub const DATATYPE: usize = 70;
     pub const BITPIX: usize = 72;
@@ -52,7 +53,7 @@ pub(super) fn wrong(
     value: impl ToString,
     expected: &'static str,
 ) -> ReadReason {
-    ReadReason::Header { format: ImageFormat::Nifti, field, value: value.to_string(), expected }
+    ReadReason::Header { format: FORMAT, field, value: value.to_string(), expected }
 }
 
 impl Header {
@@ -160,28 +161,22 @@ impl Entries<'_> {
     fn sample_type(&self) -> Result<SampleType, ReadReason> {
         let unsupported = |found: &str| {
             Err(ReadReason::Unsupported {
-                format: ImageFormat::Nifti,
+                format: FORMAT,
                 found: found.into(),
                 expected: "integers and floats of 8 to 64 bits",
             })
         };
-        Ok(match self.i16(at::DATATYPE) {
-            2 => SampleType::U8,
-            4 => SampleType::I16,
-            8 => SampleType::I32,
-            16 => SampleType::F32,
-            64 => SampleType::F64,
-            256 => SampleType::I8,
-            512 => SampleType::U16,
-            768 => SampleType::U32,
-            1024 => SampleType::I64,
-            1280 => SampleType::U64,
-            1 => return unsupported("single bits"),
-            32 | 1792 | 2048 => return unsupported("complex numbers"),
-            128 | 2304 => return unsupported("colours"),
-            1536 => return unsupported("floats of 128 bits"),
-            code => return Err(wrong("datatype", code, "a code that NIfTI-1 defines")),
-        })
+        let code = self.i16(at::DATATYPE);
+        if let Some(sample_type) = spelling::of_nifti(code) {
+            return Ok(sample_type);
+        }
+        match code {
+            1 => unsupported("single bits"),
+            32 | 1792 | 2048 => unsupported("complex numbers"),
+            128 | 2304 => unsupported("colours"),
+            1536 => unsupported("floats of 128 bits"),
+            code => Err(wrong("datatype", code, "a code that NIfTI-1 defines")),
+        }
     }
 
     /// The bytes before the samples; 0, which some writers leave there, means the least possible.
@@ -240,7 +235,7 @@ impl Entries<'_> {
             return Ok(Affine::scaling(spacing));
         }
         let quaternion = std::array::from_fn(|k| self.f64(at::QUATERN_B + 4 * k));
-        let mut matrix = affine::rotation(quaternion)?;
+        let mut matrix = rotation(quaternion)?;
         let qfac = if self.f64(at::PIXDIM) < 0.0 { -1.0 } else { 1.0 };
         for row in &mut matrix {
             row[2] *= qfac;
@@ -252,74 +247,18 @@ impl Entries<'_> {
     }
 }
 
-/// A header for samples that follow it in one file, and the four bytes that say that no extension
-/// does.
-pub(super) fn encode<const D: usize>(
-    frame: &Frame<D>,
-    datatype: i16,
-    bits: i16,
-) -> Result<[u8; FIRST_SAMPLE as usize], WriteReason> {
-    let mut bytes = [0; FIRST_SAMPLE as usize];
-    let mut put = |at: usize, value: &[u8]| bytes[at..at + value.len()].copy_from_slice(value);
-    put(0, &(BYTES as i32).to_le_bytes());
-    put(at::DIM, &(D as i16).to_le_bytes());
-    for axis in 0..7 {
-        let count = if axis < D { frame.shape()[axis] } else { 1 };
-        let count = i16::try_from(count).map_err(|_| WriteReason::Shape {
-            format: ImageFormat::Nifti,
-            shape: frame.shape().to_vec(),
-            expected: "up to 32767 along each axis; write .npy instead",
-        })?;
-        put(at::DIM + 2 * (axis + 1), &count.to_le_bytes());
-    }
-    put(at::DATATYPE, &datatype.to_le_bytes());
-    put(at::BITPIX, &bits.to_le_bytes());
-    put(at::VOX_OFFSET, &(FIRST_SAMPLE as f32).to_le_bytes());
-    put(at::SCL_SLOPE, &1f32.to_le_bytes());
-    put(at::MAGIC, b"n+1\0");
-
-    let affine = Affine::of(frame);
-    let spacing: [f64; 3] = std::array::from_fn(|k| if k < D { frame.spacing()[k] } else { 1.0 });
-    let (quaternion, qfac) = affine::quaternion(frame);
-    put(at::PIXDIM, &(qfac as f32).to_le_bytes());
-    put(at::QFORM_CODE, &2i16.to_le_bytes());
-    put(at::SFORM_CODE, &2i16.to_le_bytes());
-    for k in 0..3 {
-        let positive = single("spacing", spacing[k])?;
-        put(at::PIXDIM + 4 * (k + 1), &positive.to_le_bytes());
-        put(at::QUATERN_B + 4 * k, &(quaternion[k] as f32).to_le_bytes());
-        let offset = single("origin", affine.origin[k])?;
-        put(at::QOFFSET_X + 4 * k, &offset.to_le_bytes());
-        for c in 0..3 {
-            put(at::SROW_X + 16 * k + 4 * c, &(affine.matrix[k][c] as f32).to_le_bytes());
-        }
-        put(at::SROW_X + 16 * k + 12, &offset.to_le_bytes());
-    }
-    Ok(bytes)
-}
-
-/// The value in single precision, if it has one there that is neither infinite nor 0 by rounding.
-fn single(quantity: &'static str, value: f64) -> Result<f32, WriteReason> {
-    let rounded = value as f32;
-    if rounded.is_finite() && (rounded.is_normal() || value == 0.0 || quantity == "origin") {
-        Ok(rounded)
-    } else {
-        Err(WriteReason::Frame {
-            format: ImageFormat::Nifti,
-            quantity,
-            value,
-            expected: "a number of single precision",
-        })
-    }
-}
-
 #[cfg(test)]
 mod tests {
+    use super::super::super::view::ImageView;
+    use super::super::encode::encode;
     use super::*;
+    use atomesh::image::{Frame, Image, Samples};
 
     /// A header for 4 × 3 × 2 bytes, changed by `edit`, and read.
     fn parse(edit: impl FnOnce(&mut [u8; BYTES])) -> Result<Header, ReadReason> {
-        let encoded = encode(&Frame::new([4, 3, 2]).unwrap(), 2, 8).unwrap();
+        let frame = Frame::new([4, 3, 2]).unwrap();
+        let image = Image::new(frame, Samples::U8(vec![0; 24])).unwrap();
+        let encoded = encode(&ImageView::of(&image), 2, 8).unwrap();
         let mut bytes = std::array::from_fn(|k| encoded[k]);
         edit(&mut bytes);
         Header::parse(&bytes)

@@ -4,25 +4,61 @@
 //! the file's own: x to the right, y to the front, z to the top of the head (RAS+), nearly always
 //! in millimetres. Two-file NIfTI (`.hdr` and `.img`), NIfTI-2 and ANALYZE are refused by name.
 
-use std::io::{Read, Seek, Write};
+use std::io::{Read, Write};
 
-use atomesh::image::{Image, Samples};
 use atomesh::watch::Watch;
 use flate2::read::MultiGzDecoder;
 use flate2::write::GzEncoder;
 
 use super::affine;
+use super::any_image::AnyImage;
+use super::codec::{Begins, Codec, Output, Source};
+use super::error::{ReadReason, WriteReason};
+use super::format::ImageFormat;
+use super::note::LoadedImage;
+use super::sample_type::SampleType;
+use super::shape::plausible_count;
+use super::spelling::Spelling;
 use super::stream::{self, GZIP_RATIO, Layout};
-use super::{AnyImage, ImageFormat, ReadReason, WriteReason};
+use super::view::ImageView;
 
+mod encode;
 mod header;
+mod quaternion;
 
 use header::Header;
+#[cfg(test)]
+pub(super) use quaternion::rotation;
 
-const FORMAT: ImageFormat = ImageFormat::Nifti;
+const FORMAT: ImageFormat = ImageFormat::named("NIfTI-1");
+const FORMAT_GZIPPED: ImageFormat = ImageFormat::named("gzipped NIfTI-1");
+
+/// The magic word of a gzip stream.
+const GZIP: &[u8] = b"\x1f\x8b";
+
+pub(super) const CODEC: Codec = Codec {
+    endings: &[".nii"],
+    // the magic word stands at the end of the header, where the reader looks for it
+    begins: Begins::If(|head| !head.starts_with(GZIP)),
+    has_frame: true,
+    z_is_height: true,
+    writes_floats: true,
+    write: Some(write),
+    ..Codec::reading(FORMAT, read)
+};
+
+pub(super) const GZIPPED: Codec = Codec {
+    format: FORMAT_GZIPPED,
+    endings: &[".nii.gz"],
+    begins: Begins::With(&[GZIP]),
+    read: read_gzipped,
+    write: Some(write_gzipped),
+    ..CODEC
+};
 
 /// Reads a `.nii` file.
-pub(super) fn read<R: Read + Seek>(mut source: R, file_bytes: u64) -> Result<AnyImage, ReadReason> {
+fn read(source: Source) -> Result<LoadedImage, ReadReason> {
+    let Source { bytes: mut source, length: file_bytes, .. } = source;
     let header = Header::read(&mut source)?;
     let size = header.sample_type.size() as u64;
     let found = file_bytes.saturating_sub(header.offset) / size;
@@ -31,21 +67,22 @@ pub(super) fn read<R: Read + Seek>(mut source: R, file_bytes: u64) -> Result<Any
     if expected > found {
         return Err(ReadReason::Truncated { expected, found });
     }
-    samples_after(&mut source, &header, expected as usize, expected as usize)
+    Ok(samples_after(&mut source, &header, expected as usize, expected as usize)?.into())
 }
 
-/// Reads a `.nii.gz` file. Room for samples is made as they come, since the size of what is packed
-/// is not known; the whole stream is unpacked, so that its check sum is checked.
-pub(super) fn read_gzipped<R: Read>(source: R, file_bytes: u64) -> Result<AnyImage, ReadReason> {
-    let mut source = MultiGzDecoder::new(std::io::BufReader::with_capacity(1 << 16, source));
+/// Reads a `.nii.gz` file. Memory is allocated as samples come, since the unpacked size is not known.
+/// The whole stream is unpacked, so that its check sum is checked.
+fn read_gzipped(source: Source) -> Result<LoadedImage, ReadReason> {
+    let file_bytes = source.length;
+    let mut source = MultiGzDecoder::new(std::io::BufReader::with_capacity(1 << 16, source.bytes));
     let header = Header::read(&mut source)?;
     let density = GZIP_RATIO / header.sample_type.size() as u64;
-    let count = super::plausible_count(&header.shape, file_bytes, density)?;
+    let count = plausible_count(&header.shape, file_bytes, density)?;
     let packed_samples = file_bytes as usize / header.sample_type.size();
     let image = samples_after(&mut source, &header, count, packed_samples.saturating_mul(4))?;
     std::io::copy(&mut source, &mut std::io::sink())
-        .map_err(|e| ReadReason::decoder(ImageFormat::NiftiGz, e))?;
-    Ok(image)
+        .map_err(|e| ReadReason::decoder(FORMAT_GZIPPED, e))?;
+    Ok(image.into())
 }
 
 /// Skips what is between header and samples, and reads those.
@@ -72,34 +109,34 @@ fn samples_after(
 }
 
 /// Writes a `.nii` file, the frame as sform and as qform (code 2, "aligned").
-pub(super) fn write<const D: usize>(
-    out: &mut dyn Write,
-    image: &Image<D>,
+fn write(
+    out: &mut dyn Output,
+    image: &ImageView,
     watch: &mut dyn Watch,
 ) -> Result<(), WriteReason> {
-    let samples = image.samples();
-    let (code, bits) = match samples {
-        Samples::U8(_) => (2, 8),
-        Samples::I8(_) => (256, 8),
-        Samples::U16(_) => (512, 16),
-        Samples::I16(_) => (4, 16),
-        Samples::U32(_) => (768, 32),
-        Samples::I32(_) => (8, 32),
-        Samples::F32(_) => (16, 32),
-        _ => (64, 64),
-    };
-    out.write_all(&header::encode(image.frame(), code, bits)?)?;
-    stream::write_samples(out, samples, FORMAT, watch)
+    write_plain(out, image, watch)
 }
 
 /// Writes a `.nii.gz` file; the gzip header holds neither name nor time.
-pub(super) fn write_gzipped<const D: usize>(
-    out: &mut dyn Write,
-    image: &Image<D>,
+fn write_gzipped(
+    out: &mut dyn Output,
+    image: &ImageView,
     watch: &mut dyn Watch,
 ) -> Result<(), WriteReason> {
     let mut packed = GzEncoder::new(out, flate2::Compression::default());
-    write(&mut packed, image, watch)?;
+    write_plain(&mut packed, image, watch)?;
     packed.finish()?;
     Ok(())
+}
+
+fn write_plain(
+    out: &mut dyn Write,
+    image: &ImageView,
+    watch: &mut dyn Watch,
+) -> Result<(), WriteReason> {
+    let sample_type = Spelling::of_samples(image.samples).map(|own| (own.nifti, own.sample_type));
+    let (code, sample_type) = sample_type.unwrap_or((64, SampleType::F64));
+    let bits = 8 * sample_type.size() as i16;
+    out.write_all(&encode::encode(image, code, bits)?)?;
+    stream::write_samples(out, image.samples, FORMAT, watch)
 }

@@ -1,11 +1,12 @@
 //! The text of an NRRD header.
 
 use super::super::affine::{self, Affine, World};
+use super::super::error::ReadReason;
 use super::super::payload::{Encoding, Payload, pattern_names};
+use super::super::sample_type::{ByteOrder, SampleType};
+use super::super::spelling;
 use super::super::text::{Lines, numbers, shortened};
-use super::super::{ByteOrder, ImageFormat, ReadReason, SampleType};
-
-const FORMAT: ImageFormat = ImageFormat::Nrrd;
+use super::FORMAT;
 
 /// What a header says.
 #[derive(Debug)]
@@ -152,33 +153,8 @@ impl Fields {
 
     fn sample_type(&self) -> Result<SampleType, ReadReason> {
         let name = self.require("type")?;
-        Ok(match name.to_ascii_lowercase().as_str() {
-            "signed char" | "int8" | "int8_t" => SampleType::I8,
-            "uchar" | "unsigned char" | "uint8" | "uint8_t" => SampleType::U8,
-            "short" | "short int" | "signed short" | "signed short int" | "int16" | "int16_t" => {
-                SampleType::I16
-            }
-            "ushort" | "unsigned short" | "unsigned short int" | "uint16" | "uint16_t" => {
-                SampleType::U16
-            }
-            "int" | "signed int" | "int32" | "int32_t" => SampleType::I32,
-            "uint" | "unsigned int" | "uint32" | "uint32_t" => SampleType::U32,
-            "longlong"
-            | "long long"
-            | "long long int"
-            | "signed long long"
-            | "signed long long int"
-            | "int64"
-            | "int64_t" => SampleType::I64,
-            "ulonglong"
-            | "unsigned long long"
-            | "unsigned long long int"
-            | "uint64"
-            | "uint64_t" => SampleType::U64,
-            "float" => SampleType::F32,
-            "double" => SampleType::F64,
-            _ => return Err(wrong("type", name, "int8 ... uint64, float or double")),
-        })
+        let found = spelling::named(&name.to_ascii_lowercase(), |own| own.nrrd);
+        found.ok_or_else(|| wrong("type", name, "int8 ... uint64, float or double"))
     }
 
     fn byte_order(&self, sample_type: SampleType) -> Result<ByteOrder, ReadReason> {

@@ -1,39 +1,49 @@
 //! NRRD, nearly raw raster data: a header in text, then the samples, x fastest; or the header alone
 //! (`.nhdr`) and the samples in other files.
 //!
-//! Definition: <https://teem.sourceforge.net/nrrd/format.html>. Read are the encodings raw, ascii and
-//! gzip. A `space` of a body (left-posterior-superior, left-anterior-superior) is turned to RAS, as
-//! NIfTI's is; any other stands as it is. Axes that are no space, such as colours or tensors, are
+//! Definition: <https://teem.sourceforge.net/nrrd/format.html>. The encodings raw, ascii and gzip are
+//! read. A `space` of a body (left-posterior-superior, left-anterior-superior) is turned to RAS, as
+//! NIfTI's is; any other stands as it is. Axes of other kinds, such as colours or tensors, are
 //! refused unless they have a single value.
 //!
-//! Written is gzip, with `space: right-anterior-superior` in 3-D: whoever knows bodies then finds the
-//! image where the scan was, and to others the name says nothing.
+//! Written is gzip, with `space: right-anterior-superior` in 3-D: medical programs then find the image
+//! where the scan was, and others ignore the name.
 
-use std::io::{BufReader, Read, Write};
-use std::path::Path;
+use std::io::BufReader;
 
-use atomesh::image::Image;
 use atomesh::watch::Watch;
 use flate2::write::GzEncoder;
 
-use super::affine::{self, Affine};
+use super::affine;
+use super::codec::{Begins, Codec, Output, Source};
+use super::error::{ReadReason, WriteReason};
+use super::format::ImageFormat;
+use super::note::LoadedImage;
+use super::spelling::Spelling;
 use super::stream;
 use super::text::Lines;
-use super::watched::Watched;
-use super::{ImageFormat, LoadedImage, ReadReason, WriteReason};
+use super::view::ImageView;
 
 mod header;
 
 use header::Header;
 
-const FORMAT: ImageFormat = ImageFormat::Nrrd;
+const FORMAT: ImageFormat = ImageFormat::named("NRRD");
 
-/// Reads a `.nrrd` or `.nhdr` file that stands in `folder`, if it stands in one.
-pub(super) fn read<R: Read>(
-    source: Watched<R>,
-    file_bytes: u64,
-    folder: Option<&Path>,
-) -> Result<LoadedImage, ReadReason> {
+pub(super) const CODEC: Codec = Codec {
+    endings: &[".nrrd"],
+    header_endings: &[".nhdr"],
+    begins: Begins::With(&[b"NRRD000"]),
+    has_frame: true,
+    z_is_height: true,
+    writes_floats: true,
+    write: Some(write),
+    ..Codec::reading(FORMAT, read)
+};
+
+/// Reads a `.nrrd` or `.nhdr` file.
+fn read(source: Source) -> Result<LoadedImage, ReadReason> {
+    let Source { bytes: source, length: file_bytes, folder, .. } = source;
     let mut source = BufReader::with_capacity(1 << 16, source);
     let mut lines = Lines::new(&mut source);
     let header = Header::read(&mut lines)?;
@@ -45,36 +55,33 @@ pub(super) fn read<R: Read>(
 }
 
 /// Writes a `.nrrd` file; numbers have all their digits, so that the frame is kept exactly.
-pub(super) fn write<const D: usize>(
-    out: &mut dyn Write,
-    image: &Image<D>,
+fn write(
+    out: &mut dyn Output,
+    image: &ImageView,
     watch: &mut dyn Watch,
 ) -> Result<(), WriteReason> {
-    let kind = match image.samples().type_name() {
-        "float32" => "float",
-        "float64" => "double",
-        integer => integer,
-    };
-    let affine = Affine::of(image.frame());
-    let vector = |numbers: [f64; D]| {
-        let words: Vec<_> = numbers.iter().map(f64::to_string).collect();
+    let axes = image.dimension();
+    let name = Spelling::of_samples(image.samples).and_then(|own| own.nrrd.first());
+    let kind = name.copied().unwrap_or_else(|| image.samples.type_name());
+    let affine = image.affine();
+    let vector = |number: &dyn Fn(usize) -> f64| {
+        let words: Vec<_> = (0..axes).map(|axis| number(axis).to_string()).collect();
         format!("({})", words.join(","))
     };
-    let column = |c: usize| vector(std::array::from_fn(|r| affine.matrix[r][c]));
-    let directions: Vec<_> = (0..D).map(column).collect();
-    let sizes: Vec<_> = image.frame().shape().iter().map(usize::to_string).collect();
+    let directions: Vec<_> = (0..axes).map(|c| vector(&|r| affine.matrix[r][c])).collect();
+    let sizes: Vec<_> = image.shape.iter().map(usize::to_string).collect();
     // the format wants the world's axes before anything that is counted by them
-    let space = match D {
+    let space = match axes {
         3 => "space: right-anterior-superior".into(),
-        _ => format!("space dimension: {D}"),
+        _ => format!("space dimension: {axes}"),
     };
     let (sizes, directions) = (sizes.join(" "), directions.join(" "));
-    let (kinds, origin) = (["domain"; D].join(" "), vector(image.frame().origin()));
+    let (kinds, origin) = (vec!["domain"; axes].join(" "), vector(&|r| image.origin[r]));
     write!(
         out,
         "NRRD0004\n\
          type: {kind}\n\
-         dimension: {D}\n\
+         dimension: {axes}\n\
          {space}\n\
          sizes: {sizes}\n\
          space directions: {directions}\n\
@@ -84,7 +91,7 @@ pub(super) fn write<const D: usize>(
          space origin: {origin}\n\n"
     )?;
     let mut packed = GzEncoder::new(out, flate2::Compression::fast());
-    stream::write_samples(&mut packed, image.samples(), FORMAT, watch)?;
+    stream::write_samples(&mut packed, image.samples, FORMAT, watch)?;
     packed.finish()?;
     Ok(())
 }

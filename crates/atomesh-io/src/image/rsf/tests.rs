@@ -1,4 +1,4 @@
-use super::super::{ReadOptions, SegyOptions, decode_image, load_image};
+use super::super::{ReadOptions, SegyOptions, decode_image, load_bytes, load_image};
 use super::*;
 use atomesh::watch::Silent;
 use proptest::prelude::*;
@@ -19,7 +19,8 @@ fn file(text: &str, shape: [usize; 3], encode: fn(f32) -> [u8; 4]) -> Vec<u8> {
 }
 
 fn load(bytes: &[u8], vertical: Option<Vertical>) -> Result<LoadedImage, ReadReason> {
-    read(io::Cursor::new(bytes), bytes.len() as u64, None, vertical)
+    let segy = SegyOptions { vertical, ..SegyOptions::default() };
+    load_bytes(bytes, FORMAT, &ReadOptions { segy, raw: None }, &mut Silent)
 }
 
 fn value(image: &AnyImage, index: [usize; 3]) -> f32 {

@@ -5,7 +5,7 @@
 //! sheared. Every trace must lie within a twentieth of the lesser spacing, and one unit of the last
 //! digit of the coordinates, of its place on that grid; the farthest one is named if it does not.
 
-use super::super::ReadNote;
+use super::super::note::ReadNote;
 use super::COORDINATE_BYTES;
 use super::survey::Survey;
 use super::trace::Trace;

@@ -2,8 +2,10 @@
 
 use std::io::{Read, Seek, SeekFrom};
 
+use super::super::error::ReadReason;
+use super::super::sample_type::ByteOrder;
+use super::super::stream;
 use super::super::traces::Number;
-use super::super::{ByteOrder, ReadReason, stream};
 use super::{FORMAT, wrong};
 
 /// Bytes of a textual header; the binary one follows the first.

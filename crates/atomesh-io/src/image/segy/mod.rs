@@ -1,4 +1,4 @@
-//! SEG-Y, revisions 0 to 2: the seismic trade's tape format. Headers, then trace after trace.
+//! SEG-Y, revisions 0 to 2: the tape format of seismic data. Headers, then trace after trace.
 //!
 //! Definition: SEG Technical Standards Committee, *SEG-Y revision 2.0 Data Exchange format*, 2017;
 //! Barry, Cavers & Kneale 1975. Order of the work: the file's header and its size give the traces'
@@ -11,16 +11,21 @@
 //! the trace headers (on a line the distance along it, X itself where it runs along X), and time or
 //! depth downwards.
 //!
-//! The vertical spacing is a thousandth of the sample interval in the header, and so milliseconds
-//! for time (the standard has microseconds), metres for depth (by custom millimetres); only its name
-//! hangs on which is meant.
+//! The vertical spacing is a thousandth of the sample interval in the header: milliseconds for time (the
+//! standard has microseconds), metres for depth (by custom millimetres). Which of the two is meant changes
+//! its unit's name alone.
 
 use std::io::{Read, Seek, SeekFrom};
 
 use atomesh::image::{Frame, Image, Samples};
 
+use super::any_image::AnyImage;
+use super::codec::{Codec, Source};
+use super::error::ReadReason;
+use super::format::ImageFormat;
+use super::note::{LoadedImage, ReadNote};
+use super::options::{SegyOptions, Vertical};
 use super::traces::{self, TraceLayout};
-use super::{AnyImage, ImageFormat, LoadedImage, ReadNote, ReadReason};
 
 mod fit;
 mod header;
@@ -34,7 +39,10 @@ use header::Header;
 use survey::Survey;
 use trace::Trace;
 
-const FORMAT: ImageFormat = ImageFormat::Segy;
+const FORMAT: ImageFormat = ImageFormat::named("SEG-Y");
+
+pub(super) const CODEC: Codec =
+    Codec { endings: &[".segy", ".sgy"], has_frame: true, ..Codec::reading(FORMAT, read) };
 
 /// Where inline and crossline numbers stand if nobody says otherwise (revision 1).
 const TRACE_BYTES: [usize; 2] = [189, 193];
@@ -42,29 +50,6 @@ const TRACE_BYTES: [usize; 2] = [189, 193];
 /// Where coordinates may be, in the order tried: of the midpoint (revision 1), the source, the
 /// receiver.
 const COORDINATE_BYTES: [[usize; 2]; 3] = [[181, 185], [73, 77], [81, 85]];
-
-/// What the vertical axis of seismic data is.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash, serde::Serialize, serde::Deserialize)]
-#[serde(rename_all = "lowercase")]
-pub enum Vertical {
-    /// Two-way time, in milliseconds.
-    Time,
-    /// Depth, in metres or feet.
-    Depth,
-}
-
-/// What a SEG-Y file may not say, or say in its own way.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
-pub struct SegyOptions {
-    /// The first bytes, counted from 1, of the inline and the crossline number in a trace header;
-    /// one place twice makes a line. Default: 189 and 193.
-    pub trace_bytes: Option<[usize; 2]>,
-    /// The first bytes of X and Y. Default: the first of 181 and 185, 73 and 77, 81 and 85 that
-    /// vary.
-    pub coordinate_bytes: Option<[usize; 2]>,
-    /// What the samples of a trace are along. Default: unknown, which leaves its unit unnamed.
-    pub vertical: Option<Vertical>,
-}
 
 impl SegyOptions {
     fn trace_bytes(&self) -> [usize; 2] {
@@ -94,11 +79,9 @@ fn wrong(field: &'static str, value: String, expected: &'static str) -> ReadReas
 }
 
 /// Reads a line or a cube.
-pub(super) fn read<R: Read + Seek>(
-    mut source: R,
-    file_bytes: u64,
-    options: &SegyOptions,
-) -> Result<LoadedImage, ReadReason> {
+fn read(source: Source) -> Result<LoadedImage, ReadReason> {
+    let options = &source.options.segy;
+    let Source { bytes: mut source, length: file_bytes, .. } = source;
     options.check()?;
     let header = Header::read(&mut source, file_bytes)?;
     let heads = trace::read_headers(&mut source, &header, options)?;

@@ -1,7 +1,8 @@
 //! Which trace belongs where: numbers in trace headers to places on a grid.
 
-use super::super::{ReadNote, ReadReason};
-use super::SegyOptions;
+use super::super::error::ReadReason;
+use super::super::note::ReadNote;
+use super::super::options::SegyOptions;
 use super::trace::Trace;
 
 /// The most places for each trace that is there. A survey of irregular outline fills a third of its
@@ -56,11 +57,19 @@ fn common_divisor(a: i64, b: i64) -> i64 {
 }
 
 /// What a line's traces are numbered by.
-type Numbering = (&'static str, fn(&Trace) -> i32);
+#[derive(Clone, Copy)]
+struct Numbering {
+    /// As in `inlines`.
+    plural: &'static str,
+    of: fn(&Trace) -> i32,
+}
 
 /// In the order in which they are tried.
-const NUMBERINGS: [Numbering; 3] =
-    [("crosslines", |t| t.crossline), ("inlines", |t| t.inline), ("ensembles", |t| t.ensemble)];
+const NUMBERINGS: [Numbering; 3] = [
+    Numbering { plural: "crosslines", of: |t| t.crossline },
+    Numbering { plural: "inlines", of: |t| t.inline },
+    Numbering { plural: "ensembles", of: |t| t.ensemble },
+];
 
 impl Survey {
     /// The number of places.
@@ -80,9 +89,9 @@ impl Survey {
         if x.count > 1 && y.count > 1 && inline != crossline {
             return Self::cube(traces, [x, y], notes);
         }
-        let mut numbering = NUMBERINGS.iter().map(|&(name, of)| (name, of, numbers(of)));
-        match numbering.find(|(.., numbers)| numbers.count > 1) {
-            Some((name, of, numbers)) => Self::line(traces, (name, of), numbers, notes),
+        let mut numbered = NUMBERINGS.iter().map(|&numbering| (numbering, numbers(numbering.of)));
+        match numbered.find(|(_, numbers)| numbers.count > 1) {
+            Some((numbering, numbers)) => Self::line(traces, numbering, numbers, notes),
             None => {
                 let numbers = "not numbered, a line in the order of the file".into();
                 notes.push(ReadNote::Traces { count: traces.len(), numbers });
@@ -114,10 +123,11 @@ impl Survey {
     /// Numbered traces along x.
     fn line(
         traces: &[Trace],
-        (plural, of): Numbering,
+        numbering: Numbering,
         numbers: Numbers,
         notes: &mut Vec<ReadNote>,
     ) -> Result<Self, ReadReason> {
+        let Numbering { plural, of } = numbering;
         let shape = [numbers.count, 1];
         let text = format!("{plural} {}", numbers.text());
         notes.push(ReadNote::Traces { count: traces.len(), numbers: text.clone() });

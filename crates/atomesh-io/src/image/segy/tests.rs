@@ -1,6 +1,6 @@
 //! Small files of our own writing, in every revision and number that is read.
 
-use super::super::{ByteOrder, ReadOptions, decode_image};
+use super::super::{ByteOrder, ReadOptions, decode_image, load_bytes};
 use super::*;
 use atomesh::watch::Silent;
 use proptest::prelude::*;
@@ -111,7 +111,8 @@ impl Writer {
 
     fn load(&self, options: &SegyOptions) -> Result<LoadedImage, ReadReason> {
         let bytes = self.bytes();
-        read(std::io::Cursor::new(&bytes), bytes.len() as u64, options)
+        let options = ReadOptions { segy: *options, raw: None };
+        load_bytes(&bytes, FORMAT, &options, &mut Silent)
     }
 
     fn plain(&self) -> LoadedImage {

@@ -2,9 +2,12 @@
 
 use std::io::{Read, Seek, SeekFrom};
 
-use super::super::{ByteOrder, ReadReason, stream};
+use super::super::error::ReadReason;
+use super::super::options::SegyOptions;
+use super::super::sample_type::ByteOrder;
+use super::super::stream;
+use super::COORDINATE_BYTES;
 use super::header::{Fields, Header, TRACE_HEADER};
-use super::{COORDINATE_BYTES, SegyOptions};
 
 /// What a trace says of itself.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]

@@ -1,13 +1,15 @@
-//! Samples that come trace by trace, as columns of an image, and leave x fastest.
+//! Samples that are stored trace by trace, as columns of an image, to x fastest.
 //!
-//! Traces are read in blocks, and each sample written where it belongs: for every depth the block's
-//! traces beside each other, so that lines of cache are used whole on both sides.
+//! Traces are read in blocks, and each sample is written to its place. For every depth the block's traces lie
+//! side by side, so that cache lines are used whole on both sides.
 
 use std::io::Read;
 
 use atomesh::image::Samples;
 
-use super::{ByteOrder, ReadReason, stream};
+use super::error::ReadReason;
+use super::sample_type::ByteOrder;
+use super::stream;
 
 mod number;
 

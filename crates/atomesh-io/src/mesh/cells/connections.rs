@@ -8,7 +8,7 @@ use atomesh::mesh::{boundary_connections, connections, side_name};
 use atomesh::watch::{Phase, Watch, check};
 use serde_json::json;
 
-use super::super::MeshWriteError;
+use super::super::error::MeshWriteError;
 use super::CellData;
 use crate::atomic_file::AtomicFile;
 

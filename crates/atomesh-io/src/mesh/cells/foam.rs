@@ -2,16 +2,16 @@
 
 use atomesh::mesh::side_name;
 
-use super::super::polymesh::{Beyond, FaceZone, Patch, PolyMesh, PolyMeshError};
+use super::super::openfoam::{Beyond, FaceZone, FoamMesh, FoamMeshError, Patch};
 use super::CellData;
 
-impl PolyMesh {
+impl FoamMesh {
     /// Cells with the sides of the box as patches, xmin, xmax, ymin ..., and their features as the face zones
     /// `feature1`, `feature2` ... Polygons become prisms as high as the square root of their mean area.
     ///
     /// # Errors
-    /// [`PolyMeshError`] never, for a mesh that keeps its promises.
-    fn of_cells<const D: usize>(data: &CellData<D>) -> Result<Self, PolyMeshError> {
+    /// [`FoamMeshError`] never, for a mesh that keeps its promises.
+    fn of_cells<const D: usize>(data: &CellData<D>) -> Result<Self, FoamMeshError> {
         let mesh = data.mesh;
         let patches: Vec<Patch> = (0..2 * D).map(|side| Patch::new(side_name(side))).collect();
         let mut beyond: Vec<Beyond> = mesh.neighbours().iter().map(|&c| Beyond::Cell(c)).collect();
@@ -55,7 +55,7 @@ impl PolyMesh {
 /// `feature1`, `feature2` ... Polygons become prisms as high as the square root of their mean area.
 ///
 /// # Errors
-/// [`PolyMeshError`] only if the mesh does not keep what it promises.
-pub fn poly_mesh_of<const D: usize>(data: &CellData<D>) -> Result<PolyMesh, PolyMeshError> {
-    PolyMesh::of_cells(data)
+/// [`FoamMeshError`] only if the mesh does not keep what it promises.
+pub fn foam_mesh_of<const D: usize>(data: &CellData<D>) -> Result<FoamMesh, FoamMeshError> {
+    FoamMesh::of_cells(data)
 }

@@ -6,20 +6,24 @@
 pub(super) mod connections;
 mod foam;
 mod modflow;
+mod raw;
 mod read;
+mod read_vtu;
 mod table;
+mod vtu;
 
 pub use connections::{ConnectionFiles, Flow, write_connections, write_connections_with_flow};
-pub use foam::poly_mesh_of;
+pub use foam::foam_mesh_of;
 pub use modflow::{ModflowFiles, Rock, write_modflow};
-pub(in crate::mesh) use read::RawCells;
-pub use read::{AnyCells, CellReadError, LoadedCells, read_cells};
+pub use raw::CellReadError;
+pub use read::{AnyCells, LoadedCells, read_cells};
+pub use vtu::{write_cells_vtu, write_cells_vtu_with};
 
 use atomesh::features::FeatureFaces;
 use atomesh::image::Frame;
 use atomesh::mesh::PolyMesh;
 
-use super::Provenance;
+use super::provenance::Provenance;
 
 /// Polygons or polyhedra in world coordinates, with what is known of them.
 #[derive(Clone, Copy, Debug)]
@@ -37,6 +41,6 @@ pub struct CellData<'a, const D: usize> {
 impl<const D: usize> CellData<'_, D> {
     /// Frame and provenance as JSON, the text that all mesh files carry.
     pub(super) fn metadata(&self) -> String {
-        super::metadata::encode_parts(Some(self.frame), Some(self.provenance))
+        super::metadata::encode(Some(self.frame), Some(self.provenance))
     }
 }

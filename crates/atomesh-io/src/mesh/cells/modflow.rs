@@ -14,7 +14,7 @@ use std::path::{Path, PathBuf};
 use atomesh::mesh::{Connection, PolyMesh, connections};
 use atomesh::watch::{Phase, Watch, check};
 
-use super::super::MeshWriteError;
+use super::super::error::MeshWriteError;
 use super::CellData;
 use crate::atomic_file::AtomicFile;
 
@@ -49,7 +49,7 @@ impl ModflowFiles {
     }
 }
 
-/// What MODFLOW is told besides the cells.
+/// What MODFLOW needs besides the cells.
 #[derive(Clone, Copy, Debug)]
 pub struct Rock<'a> {
     /// Permeability (MODFLOW: hydraulic conductivity) of each cell.

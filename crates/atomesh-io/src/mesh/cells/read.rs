@@ -6,87 +6,23 @@
 //! faces lie on features.
 
 use std::collections::BTreeMap;
-use std::io;
 use std::path::Path;
 
 use atomesh::features::FeatureFaces;
 use atomesh::geometry::{Bounds, Point};
 use atomesh::image::{Frame, Units};
 use atomesh::mesh::{Delaunay, PolyMesh};
-use atomesh::voronoi::{VoronoiError, voronoi};
-use atomesh::watch::{Cancelled, Watch};
+use atomesh::voronoi::voronoi;
+use atomesh::watch::Watch;
 
-use super::super::data::{OwnedField, Provenance};
-use super::super::metadata::Metadata;
-use super::super::read::MeshReadError;
-use super::super::vtu::read_cells_vtu;
+use super::super::field::OwnedField;
+use super::super::provenance::Provenance;
+use super::raw::{CellReadError, RawCells, read_bytes};
+use super::read_vtu::read_cells_vtu;
 use super::table::read_list;
 
 /// Volumes may differ from the file's by this share of the mean volume: rounding on the way through the frame.
 const SAME_VOLUME: f64 = 1e-8;
-
-/// Why Voronoi cells were not read.
-#[derive(Debug, thiserror::Error)]
-#[non_exhaustive]
-pub enum CellReadError {
-    /// The system did not give the bytes.
-    #[error("{file} could not be read: {error}")]
-    Io {
-        /// The file.
-        file: String,
-        /// What the system said.
-        error: io::Error,
-    },
-    /// The name says no format.
-    #[error("the ending says no format; expected .vtu or .json (a list of connections)")]
-    Format,
-    /// The bytes are not what the format says.
-    #[error(transparent)]
-    Mesh(#[from] MeshReadError),
-    /// A list of connections that is none.
-    #[error("{place}: expected {expected}, found {found}")]
-    Malformed {
-        /// The file, and the line where there is one.
-        place: String,
-        /// What is expected.
-        expected: String,
-        /// What is there.
-        found: String,
-    },
-    /// There is something else than Voronoi cells.
-    #[error(
-        "{found} where Voronoi cells are expected, as `atomesh mesh --mesh voronoi` writes them"
-    )]
-    NotVoronoi {
-        /// What there is.
-        found: String,
-    },
-    /// The sites do not make cells.
-    #[error(transparent)]
-    Voronoi(VoronoiError),
-    /// A cell is not that of its site.
-    #[error("cell {cell} has the volume {found}; the cell of its site has {expected}")]
-    OtherCell {
-        /// The cell.
-        cell: usize,
-        /// The file's volume.
-        found: f64,
-        /// That of the Voronoi cell.
-        expected: f64,
-    },
-    /// The watch ended the work.
-    #[error(transparent)]
-    Cancelled(#[from] Cancelled),
-}
-
-impl From<VoronoiError> for CellReadError {
-    fn from(error: VoronoiError) -> Self {
-        match error {
-            VoronoiError::Cancelled(cancelled) => Self::Cancelled(cancelled),
-            other => Self::Voronoi(other),
-        }
-    }
-}
 
 /// Voronoi cells as read from a file.
 #[derive(Clone, Debug)]
@@ -112,23 +48,10 @@ pub enum AnyCells {
     Volume(LoadedCells<3>),
 }
 
-/// What a file says of cells.
-#[derive(Debug, Default)]
-pub(in crate::mesh) struct RawCells {
-    pub dimension: usize,
-    /// Padded by 0 in the plane.
-    pub sites: Vec<Point<3>>,
-    pub volumes: Vec<f64>,
-    pub fields: Vec<OwnedField<f64>>,
-    /// The feature of each face between two cells that lies on one, from 1 on.
-    pub features: BTreeMap<(u32, u32), u32>,
-    pub metadata: Metadata,
-}
-
 /// Reads Voronoi cells from a .vtu file, or the head (.json) of a list of connections and the tables beside it.
 ///
 /// # Errors
-/// [`CellReadError`] if that is no such file, or its cells are not those of its sites.
+/// [`CellReadError`] if the file is of another kind, or its cells are not those of its sites.
 pub fn read_cells(path: &Path, watch: &mut dyn Watch) -> Result<AnyCells, CellReadError> {
     let extension = path.extension().unwrap_or_default().to_ascii_lowercase();
     let raw = match extension.to_str() {
@@ -141,11 +64,6 @@ pub fn read_cells(path: &Path, watch: &mut dyn Watch) -> Result<AnyCells, CellRe
     } else {
         Ok(AnyCells::Volume(rebuild(&Delaunay::<3>::new(), raw, watch)?))
     }
-}
-
-pub(super) fn read_bytes(path: &Path) -> Result<Vec<u8>, CellReadError> {
-    std::fs::read(path)
-        .map_err(|error| CellReadError::Io { file: path.display().to_string(), error })
 }
 
 /// The cells of the sites, in the box of the frame.

@@ -4,9 +4,9 @@ use std::path::Path;
 
 use serde_json::Value;
 
-use super::super::data::OwnedField;
+use super::super::field::OwnedField;
 use super::super::metadata::Metadata;
-use super::read::{CellReadError, RawCells, read_bytes};
+use super::raw::{CellReadError, RawCells, read_bytes};
 
 /// Columns of the cells' table that are no fields.
 const GEOMETRY: [&str; 3] = ["site_", "center_", "volume"];

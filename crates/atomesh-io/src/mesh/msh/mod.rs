@@ -5,32 +5,15 @@
 //! physical groups with names; where there are groups but no regions, all cells are in one named `domain`.
 //! Physical groups have numbers above 0: regions of other numbers get the next ones, and the comment tells
 //! which. Fields at points are `$NodeData`, fields in cells `$ElementData`. The frame and the provenance are
-//! JSON in `$Comments`, a section that Gmsh passes over.
+//! JSON in `$Comments`, a section that Gmsh ignores.
 
 mod entities;
 mod read;
 mod write;
 
+pub use super::format::{MshEncoding, MshVersion};
 pub use read::read_msh;
 pub use write::write_msh;
-
-/// The versions of the format.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
-pub enum MshVersion {
-    /// 4.1, of Gmsh 4.
-    V41,
-    /// 2.2, which most other programs read.
-    V22,
-}
-
-/// How numbers are written.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
-pub enum MshEncoding {
-    /// Little-endian bytes.
-    Binary,
-    /// Decimal text; reals have the 17 digits that determine them.
-    Text,
-}
 
 /// Gmsh's number for a line (`dimension` 1), a triangle (2) or a tetrahedron (3), or for one of second order.
 pub(super) fn element_type(dimension: usize, is_quadratic: bool) -> i32 {

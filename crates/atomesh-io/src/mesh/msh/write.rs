@@ -7,10 +7,13 @@ use atomesh::mesh::Mesh;
 use atomesh::watch::{Phase, Watch, check};
 
 use super::super::column::{Endian, Number};
-use super::super::data::{Field, MeshData};
-use super::super::{MeshWriteError, metadata};
+use super::super::data::MeshData;
+use super::super::error::MeshWriteError;
+use super::super::field::Field;
+use super::super::format::{MshEncoding, MshVersion};
+use super::super::metadata;
 use super::entities::Entities;
-use super::{MshEncoding, MshVersion, element_type, place};
+use super::{element_type, place};
 
 /// Bytes gathered before they are handed on.
 const CHUNK: usize = 1 << 18;
@@ -26,7 +29,8 @@ const ITEMS_PER_STEP: usize = 1 << 18;
 pub fn write_msh<const D: usize>(
     out: &mut impl Write,
     data: &MeshData<D>,
-    (version, encoding): (MshVersion, MshEncoding),
+    version: MshVersion,
+    encoding: MshEncoding,
     watch: &mut dyn Watch,
 ) -> Result<(), MeshWriteError> {
     let entities = Entities::of(data);
@@ -38,7 +42,10 @@ pub fn write_msh<const D: usize>(
     let steps = 2 + data.point_fields().len() + data.cell_fields().len();
     let items = (steps * count.max(1)) as f64;
     let mut numbers = Numbers { out, bytes: vec![], encoding, watch, done: 0, items };
-    numbers.head(version, &metadata::encode_with_regions(data, &entities.known_as))?;
+    numbers.head(
+        version,
+        &metadata::encode_with_regions(data.frame(), data.provenance(), &entities.known_as),
+    )?;
     physical_names(&mut numbers, &entities);
     match version {
         MshVersion::V41 => {
@@ -158,21 +165,15 @@ impl<W: Write> Numbers<'_, W> {
         Ok(())
     }
 
-    /// An element of a dimension, in the physical group and the entity of those numbers.
-    fn element_22(
-        &mut self,
-        tag: usize,
-        kind: i32,
-        (physical, entity): (i32, usize),
-        nodes: &[u32],
-    ) {
+    /// An element of Gmsh's kind, in a group.
+    fn element_22(&mut self, tag: usize, kind: i32, group: Group, nodes: &[u32]) {
         self.int(tag);
         if self.encoding == MshEncoding::Text {
             self.put(kind);
             self.int(2);
         }
-        self.put(physical);
-        self.int(entity);
+        self.put(group.physical);
+        self.int(group.entity);
         let count = nodes.len();
         (0..count).for_each(|k| self.int(nodes[place(count, k)] as usize + 1));
     }
@@ -182,6 +183,13 @@ impl<W: Write> Numbers<'_, W> {
             self.real(p.get(k).copied().unwrap_or(0.0));
         }
     }
+}
+
+/// What an element of version 2.2 is in: a physical group, 0 for none, and an entity.
+#[derive(Clone, Copy)]
+struct Group {
+    physical: i32,
+    entity: usize,
 }
 
 fn nodes_41<W: Write, const D: usize>(
@@ -323,7 +331,7 @@ fn elements_22<W: Write, const D: usize>(
         let entity = entities.entity_of(cell);
         let physical = entities.cells[entity].physicals.first().copied().unwrap_or(0);
         let kind = element_type(D, is_quadratic);
-        to.element_22(cell + 1, kind, (physical, entity + 1), nodes);
+        to.element_22(cell + 1, kind, Group { physical, entity: entity + 1 }, nodes);
         to.item()?;
     }
     if !text && facets > 0 {
@@ -336,7 +344,8 @@ fn elements_22<W: Write, const D: usize>(
             for facet in &entity.facets {
                 tag += 1;
                 let kind = element_type(D - 1, is_quadratic);
-                to.element_22(tag, kind, (physical, at + 1), &data.facet_nodes(facet));
+                let group = Group { physical, entity: at + 1 };
+                to.element_22(tag, kind, group, &data.facet_nodes(facet));
                 to.item()?;
             }
         }

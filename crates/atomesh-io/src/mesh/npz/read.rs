@@ -7,9 +7,11 @@ use npyz::{Deserialize, NpyFile, Order};
 use zip::ZipArchive;
 use zip::result::ZipError;
 
-use super::super::data::{AnyMesh, OwnedField};
+use super::super::field::OwnedField;
+use super::super::loaded::{AnyMesh, LoadedMesh};
 use super::super::metadata::Metadata;
-use super::super::read::{MeshReadError, loaded, malformed};
+use super::super::parts::loaded;
+use super::super::read_error::{MeshReadError, malformed};
 
 /// Reads the mesh of an NPZ archive with the arrays `points` (n × 2 or n × 3, reals) and `cells`
 /// (m × 3 or m × 4, integers). Other arrays of n reals are fields at the points; arrays
@@ -80,7 +82,7 @@ impl<'a> Archive<'a> {
         &mut self,
         points: &Array,
         cells: &Array,
-    ) -> Result<super::super::LoadedMesh<D>, MeshReadError> {
+    ) -> Result<LoadedMesh<D>, MeshReadError> {
         let corners = cells.indices()?;
         let points: Vec<[f64; D]> = points.reals()?.as_chunks().0.to_vec();
         if corners.len() % (D + 1) != 0 {

@@ -7,8 +7,9 @@ use zip::write::SimpleFileOptions;
 use zip::{CompressionMethod, DateTime, ZipWriter};
 
 use super::super::column::{Column, Endian};
-use super::super::data::{Field, MeshData, Values};
-use super::super::{MeshWriteError, metadata};
+use super::super::data::MeshData;
+use super::super::error::MeshWriteError;
+use super::super::field::{Field, Values};
 
 /// Writes a mesh as NPZ; cells of second order as straight ones.
 ///
@@ -20,7 +21,7 @@ pub fn write_npz<const D: usize>(
     watch: &mut dyn Watch,
 ) -> Result<(), MeshWriteError> {
     let little = Endian::Little;
-    let (mesh, text) = (data.mesh(), metadata::encode(data));
+    let (mesh, text) = (data.mesh(), data.metadata());
     let (points, cells) = (mesh.points(), mesh.cell_count());
     let coordinates = points.as_flattened();
     let mut arrays = vec![

@@ -1,9 +1,11 @@
 //! Reading VTK's legacy format, binary (always big-endian) and text, versions up to 5.1.
 
 use super::super::column::{Endian, Number};
-use super::super::data::{AnyMesh, OwnedField};
+use super::super::field::OwnedField;
+use super::super::loaded::AnyMesh;
 use super::super::metadata::{self, Metadata};
-use super::super::read::{MeshReadError, Parts, excerpt, malformed};
+use super::super::parts::Parts;
+use super::super::read_error::{MeshReadError, excerpt, malformed};
 
 /// Reads the triangles or tetrahedra of a legacy VTK file.
 ///

@@ -5,11 +5,13 @@ use std::io::Write;
 use atomesh::watch::{Phase, Watch, check};
 
 use super::super::column::{Column, Endian};
-use super::super::data::{Field, MeshData, Values};
-use super::super::{MeshWriteError, metadata, vtu};
+use super::super::data::MeshData;
+use super::super::error::MeshWriteError;
+use super::super::field::{Field, Values};
+use super::super::{metadata, vtu};
 
-/// Writes a mesh as a legacy VTK file: big-endian binary, points as double, fields as float, or double if they came so; the frame
-/// and the provenance are JSON in the field data.
+/// Writes a mesh as a legacy VTK file: big-endian binary, points as double, fields in their own precision;
+/// frame and provenance are JSON in the field data.
 ///
 /// # Errors
 /// If the cells' list is longer than the format's 32-bit numbers can say, `out` cannot be written to,
@@ -28,7 +30,7 @@ pub fn write_vtk<const D: usize>(
         return Err(MeshWriteError::TooMany { format: "VTK legacy", count, limit });
     }
     let big = Endian::Big;
-    let text = metadata::encode(data);
+    let text = data.metadata();
     let name = metadata::NAME;
     writeln!(out, "# vtk DataFile Version 3.0\natomesh\nBINARY\nDATASET UNSTRUCTURED_GRID")?;
     writeln!(out, "FIELD FieldData 1\n{name} 1 {} unsigned_char\n{text}", text.len())?;

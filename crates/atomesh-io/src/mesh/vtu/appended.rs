@@ -1,8 +1,8 @@
 //! VTK's XML files with appended data: a head that names every array and its place, then all arrays, raw, as
 //! zlib blocks.
 //!
-//! Blocks have a fixed size and are compressed side by side, so the bytes do not depend on the number
-//! of threads.
+//! Blocks have a fixed size and are compressed in parallel, so that the bytes do not depend on the number of
+//! threads.
 
 use std::io::{self, Seek, SeekFrom, Write};
 use std::ops::Range;
@@ -12,10 +12,10 @@ use flate2::Compression;
 use flate2::write::ZlibEncoder;
 use rayon::prelude::*;
 
-use super::super::MeshWriteError;
 use super::super::cell_fields::VectorField;
 use super::super::column::{Column, Endian};
-use super::super::data::{Field, Values};
+use super::super::error::MeshWriteError;
+use super::super::field::{Field, Values};
 
 /// Bytes of a block before compression. Large enough for zlib to do well (its window has 32 KiB),
 /// small enough for many threads.

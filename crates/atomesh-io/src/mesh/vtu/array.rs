@@ -1,8 +1,8 @@
 //! The numbers of a DataArray, however they are encoded.
 //!
-//! Binary data begin with their length (or, compressed, the number and lengths of their blocks) in the
-//! file's header type; base64 may hold this header and the data as one text or as two. Nothing is
-//! allocated before the bytes that call for it were found.
+//! Binary data begin with a header in the file's header type: their length, or, compressed, the number and
+//! lengths of their blocks. Base64 may hold header and data as one text or as two. Memory is allocated only
+//! once the bytes that ask for it were found.
 
 use std::borrow::Cow;
 
@@ -11,7 +11,7 @@ use rayon::prelude::*;
 use std::io::Read;
 
 use super::super::column::{Endian, Number};
-use super::super::read::{MeshReadError, excerpt, malformed};
+use super::super::read_error::{MeshReadError, excerpt, malformed};
 
 /// How the binary arrays of a file are laid out.
 #[derive(Clone, Copy, Debug)]

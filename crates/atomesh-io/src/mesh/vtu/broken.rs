@@ -7,7 +7,8 @@ use atomesh::watch::Watch;
 
 use super::super::column::{Column, Endian, fits_i32};
 use super::super::data::MeshData;
-use super::super::{MeshWriteError, metadata};
+use super::super::error::MeshWriteError;
+use super::super::metadata;
 use super::appended::Head;
 use crate::atomic_file::AtomicFile;
 
@@ -32,7 +33,7 @@ pub fn write_broken_vtu<const D: usize>(
     pressure: &(dyn Fn(usize, usize, &[f64; D]) -> f64 + Sync),
     watch: &mut dyn Watch,
 ) -> Result<(), MeshWriteError> {
-    let (text, mesh, little) = (metadata::encode(data), data.mesh(), Endian::Little);
+    let (text, mesh, little) = (data.metadata(), data.mesh(), Endian::Little);
     let each = if order < 2 { D + 1 } else { (D + 1) * (D + 2) / 2 };
     let (cells, points) = (mesh.cell_count(), mesh.cell_count() * each);
     let value = move |i: usize| {

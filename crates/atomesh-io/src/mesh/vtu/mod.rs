@@ -3,17 +3,12 @@
 pub(crate) mod appended;
 pub(crate) mod array;
 mod broken;
-mod cells;
-pub(crate) mod poly;
 pub(crate) mod read;
-mod read_cells;
 mod write;
 pub(crate) mod xml;
 
 pub use broken::write_broken_vtu;
-pub use cells::{write_cells_vtu, write_cells_vtu_with};
 pub use read::read_vtu;
-pub(in crate::mesh) use read_cells::read_cells_vtu;
 pub use write::write_vtu;
 
 /// VTK's number for a cell of so many points: a triangle or tetrahedron, or one of second order.

@@ -1,9 +1,11 @@
 //! Reading VTU: text, base64 and raw data, inline and appended, plain and compressed by zlib.
 
 use super::super::column::Endian;
-use super::super::data::{AnyMesh, OwnedField};
+use super::super::field::OwnedField;
+use super::super::loaded::AnyMesh;
 use super::super::metadata::{self, Metadata};
-use super::super::read::{MeshReadError, Parts, excerpt, malformed};
+use super::super::parts::Parts;
+use super::super::read_error::{MeshReadError, excerpt, malformed};
 use super::super::tags::RawTags;
 use super::array::{Array, Layout, Place};
 use super::xml::{Event, Scanner, Tag, find};

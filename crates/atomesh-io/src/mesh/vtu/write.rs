@@ -1,10 +1,10 @@
 //! Writing VTU.
 //!
-//! Points are Float64 with z = 0 in flat meshes; indices are Int32, or Int64 where they do
-//! not fit; fields are Float32, or Float64 if they came so; vectors Float64 with z = 0 in flat meshes. Regions are the cell array `region`, Int32, with
-//! `region_ids` and `region_names` in the field data. There the groups of facets are too: `facets`, the corners
-//! of each; `facet_group`, the number of its group; `facet_group_ids` and `facet_group_names`. Names are text,
-//! UInt8, one a line.
+//! Points and vectors are Float64, with z = 0 in flat meshes; indices are Int32, or Int64 where they do not
+//! fit; fields are Float32 or Float64, as they were given. Regions are the cell array `region`, Int32, with
+//! `region_ids` and `region_names` in the field data. The field data also hold the groups of facets: `facets`,
+//! the corners of each; `facet_group`, the number of its group; `facet_group_ids` and `facet_group_names`.
+//! Names are text, UInt8, one a line.
 
 use std::io::{Seek, Write};
 
@@ -13,7 +13,8 @@ use atomesh::watch::Watch;
 
 use super::super::column::{Column, Endian, fits_i32};
 use super::super::data::MeshData;
-use super::super::{MeshWriteError, metadata};
+use super::super::error::MeshWriteError;
+use super::super::metadata;
 use super::appended::Head;
 
 /// Writes a mesh as a VTU file (VTK's XML unstructured grid), which ParaView and meshio read.
@@ -25,7 +26,7 @@ pub fn write_vtu<const D: usize>(
     data: &MeshData<D>,
     watch: &mut dyn Watch,
 ) -> Result<(), MeshWriteError> {
-    let text = metadata::encode(data);
+    let text = data.metadata();
     let tags = data.tags().map(TagArrays::new).unwrap_or_default();
     let mut head = Head::new("UnstructuredGrid");
     head.text("<FieldData>\n");

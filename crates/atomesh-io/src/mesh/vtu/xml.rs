@@ -1,7 +1,7 @@
-//! The little of XML that VTK's files use: tags with attributes, comments, text; no entities in the
-//! values that matter, no namespaces. Appended data may be raw bytes, so this reads bytes.
+//! The subset of XML that VTK's files use: tags with attributes, comments, text; no entities in values that
+//! matter, no namespaces. Appended data may be raw bytes, so this reads bytes.
 
-use super::super::read::{MeshReadError, excerpt, malformed};
+use super::super::read_error::{MeshReadError, excerpt, malformed};
 
 /// An opening tag (or one that closes itself).
 #[derive(Clone, Debug)]

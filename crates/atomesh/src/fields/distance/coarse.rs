@@ -35,8 +35,8 @@ pub(super) fn reduce<const D: usize>(
     let mut shape = from.shape;
     let mut reduced: Option<Vec<f32>> = None;
     for turn in 0..D {
-        // the least is the same in any order: the axis whose lines lie farthest apart goes first, so that
-        // the samples are read as they lie and what is left for the others is small
+        // the least is the same in any order: the axis with the greatest stride goes first, so that samples
+        // are read in the order of memory and few are left for the other axes
         let axis = if take == Take::Least { D - 1 - turn } else { turn };
         if to.shape[axis] < shape[axis] {
             let source = reduced.as_deref().unwrap_or(values);
@@ -113,7 +113,7 @@ fn reduce_axis(
 }
 
 impl Footprint {
-    /// What the node takes from a row of samples.
+    /// The node's value from a row of samples.
     fn of(&self, row: &[f32], take: Take) -> f32 {
         let samples = &row[self.first..self.first + self.weights.len()];
         match take {

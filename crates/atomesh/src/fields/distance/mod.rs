@@ -1,25 +1,25 @@
 //! The nominal distance d(x): the edge length wanted at x.
 //!
 //! d is smooth, |∇d| ≪ 1 (Hale 2001, section 2.1), so it is kept on nodes half the least distance
-//! apart, much fewer than the image's samples, and interpolated linearly between them. Wherever it
-//! comes from, its slope is limited: d(x) ≤ d(y) + g |x − y|, by lowering it where it is too
-//! large. It never falls below its own minimum. Lengths are in lattice units.
+//! apart, far fewer than the image's samples, and interpolated linearly between them. Wherever it
+//! comes from, its slope is limited by g: it is lowered until d(x) ≤ d(y) + g |x − y| for all x and y,
+//! which leaves its minimum as it is. Lengths are in lattice units.
 
 mod coarse;
+mod default;
 mod grading;
 mod limit;
-mod tidy;
 
-use crate::geometry::Point;
+use crate::geometry::{Bounds, Point};
 use crate::image::Grid;
 use coarse::{Take, coarse_grid, reduce};
 use limit::limit_gradient;
 use rayon::prelude::*;
 
+pub use default::default_distance;
 pub use grading::{GradeBy, Grading, feature_density};
-pub use tidy::default_distance;
 
-/// Greatest slope of d where none is asked for, in lattice units of d per lattice unit of way.
+/// The default limit of the slope of d, in lattice units per lattice unit.
 ///
 /// Of the order of the paper's Fig. 5 (d from 6 to 18 within some 50 samples); neighbouring edges
 /// then differ by a quarter, which a lattice follows without defects.
@@ -89,8 +89,8 @@ pub struct NominalDistance<const D: usize> {
     inverse_step: [f64; D],
     /// d at the nodes, x fastest; empty for a constant.
     values: Vec<f32>,
-    /// The box's area or volume.
-    measure: f64,
+    /// The image's box.
+    bounds: Bounds<D>,
     least: f64,
     greatest: f64,
     greatest_slope: f64,
@@ -108,7 +108,7 @@ impl<const D: usize> NominalDistance<D> {
             nodes: Grid { shape: [1; D], step: grid.step },
             inverse_step: [0.0; D],
             values: Vec::new(),
-            measure: grid.bounds().measure(),
+            bounds: grid.bounds(),
             least: distance,
             greatest: distance,
             greatest_slope: 0.0,
@@ -150,7 +150,7 @@ impl<const D: usize> NominalDistance<D> {
             greatest_slope: if constant { 0.0 } else { greatest_slope(&values, &nodes) },
             nodes: if constant { Grid { shape: [1; D], step: nodes.step } } else { nodes },
             values: if constant { Vec::new() } else { values },
-            measure: grid.bounds().measure(),
+            bounds: grid.bounds(),
             least,
             greatest,
         }
@@ -192,6 +192,11 @@ impl<const D: usize> NominalDistance<D> {
         sum
     }
 
+    /// The image's box.
+    pub fn bounds(&self) -> &Bounds<D> {
+        &self.bounds
+    }
+
     /// The least d anywhere.
     pub fn least(&self) -> f64 {
         self.least
@@ -223,7 +228,7 @@ impl<const D: usize> NominalDistance<D> {
     /// `density` is the crystal's number of atoms per d^D: 2/√3 for hexagonal, √2 for FCC, 3√3/4
     /// for BCC.
     pub fn estimated_atoms(&self, density: f64) -> f64 {
-        self.measure * self.average(|d| density / d.powi(D as i32))
+        self.bounds.measure() * self.average(|d| density / d.powi(D as i32))
     }
 
     /// The mean of a function of d over the box, by the trapezoidal rule. Rows are added in their order,
@@ -320,7 +325,7 @@ fn least_length(field: &[f32]) -> Option<f32> {
     good.then_some(least)
 }
 
-/// Values that one thread looks at in a go.
+/// Values that one thread checks at a time.
 const BLOCK: usize = 1 << 16;
 
 /// The weight of node `i` of `n` in the trapezoidal rule.

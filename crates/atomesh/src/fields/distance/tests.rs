@@ -140,7 +140,7 @@ fn what_is_no_distance_is_refused() {
 }
 
 #[test]
-fn the_default_is_tidy_and_gives_the_promised_number_of_atoms() {
+fn the_default_is_round_and_gives_the_promised_number_of_atoms() {
     for n in [200, 256, 999, 5000] {
         let grid = Grid { shape: [n, n], step: [12.5, 12.5] };
         let d = NominalDistance::constant(&grid, default_distance(&grid)).unwrap();

@@ -4,23 +4,26 @@ use crate::geometry::{Point, difference, distance_squared, dot};
 
 use super::guides::Guide;
 
-/// What a cell costs for each unit of sine below the floor, over the floor: more than any q and guide gain.
+/// What a cell below the floor costs for each unit of sine, over the floor's: more than any q and guide gain.
 const BELOW_FLOOR: f64 = 10.0;
-/// The same, for being below at all.
+/// What a cell costs in addition for being below the floor at all.
 const JUST_BELOW: f64 = 0.5;
 /// The q of a cell that costs nothing. It is about the mean of aligned meshes, so that neither more cells nor
 /// fewer are cheaper for their number.
 const COMMON_QUALITY: f64 = 0.9;
-/// The share of a guide's pull that is felt from afar.
+/// The share of a guide's pull on edges far from it.
 const FAR_SHARE: f64 = 0.1;
 
+/// The sine of the least angle of the flattest cell that may be made.
+const FLATTEST: f64 = 1e-7;
+
 /// A fall from 1 to 0 as a squared distance or sine grows.
-struct Fall {
+struct Ramp {
     to: f64,
     slope: f64,
 }
 
-impl Fall {
+impl Ramp {
     const fn between(from: f64, to: f64) -> Self {
         Self { to: to * to, slope: 1.0 / (to * to - from * from) }
     }
@@ -31,14 +34,15 @@ impl Fall {
     }
 }
 
-/// The pull of an edge falls from 0.7 τ to 1.6 τ: within τ counts, and some room is left.
-const NEAR: Fall = Fall::between(0.7, 1.6);
-/// From afar, from 0 to 3 τ.
-const FAR: Fall = Fall::between(0.0, 3.0);
-/// It falls as the edge leans, from 14° to 30° (sines): within 20° counts.
-const ALONG: Fall = Fall::between(0.241_921_896, 0.5);
-/// From afar, from 0° to 50°.
-const ASTRIDE: Fall = Fall::between(0.0, 0.766_044_443);
+/// How well an edge follows a guide falls with the distance, from 0.7 τ to 1.6 τ: the alignment measure counts up
+/// to τ.
+const NEAR: Ramp = Ramp::between(0.7, 1.6);
+/// The same for the far share: from 0 to 3 τ.
+const FAR: Ramp = Ramp::between(0.0, 3.0);
+/// It falls with the angle, from 14° to 30° (sines): the alignment measure counts up to 20°.
+const ALONG: Ramp = Ramp::between(0.241_921_896, 0.5);
+/// The same for the far share: from 0° to 50°.
+const ALONG_FAR: Ramp = Ramp::between(0.0, 0.766_044_443);
 
 /// The sine of a triangle's least angle; 0 or less if it is flat or inverted.
 pub(super) fn least_sine(a: Point<2>, b: Point<2>, c: Point<2>) -> f64 {
@@ -97,12 +101,12 @@ impl Edge {
     /// How well the edge follows a guide, 0 to 1.
     #[inline]
     pub fn follows(&self, guide: &Guide) -> f64 {
-        let across = dot(&self.along, &guide.normal);
+        let across = dot(&self.along, &guide.at.normal);
         let sine = across * across * self.inverse_length_squared;
-        if sine >= ASTRIDE.to {
+        if sine >= ALONG_FAR.to {
             return 0.0;
         }
-        let w = difference(&guide.position, &self.from);
+        let w = difference(&guide.at.position, &self.from);
         let t = (dot(&w, &self.along) * self.inverse_length_squared).clamp(0.0, 1.0);
         let foot = [w[0] - t * self.along[0], w[1] - t * self.along[1]];
         let distance = dot(&foot, &foot) * guide.inverse_reach_squared;
@@ -110,8 +114,16 @@ impl Edge {
             return 0.0;
         }
         (1.0 - FAR_SHARE) * NEAR.at(distance) * ALONG.at(sine)
-            + FAR_SHARE * FAR.at(distance) * ASTRIDE.at(sine)
+            + FAR_SHARE * FAR.at(distance) * ALONG_FAR.at(sine)
     }
+}
+
+/// What a cell costs.
+#[derive(Clone, Copy)]
+pub(super) struct CellCost {
+    pub cost: f64,
+    /// The sine of its least angle.
+    pub sine: f64,
 }
 
 /// What decides the energy of cells.
@@ -147,8 +159,8 @@ impl<'a> Energy<'a> {
         guide.pull * (1.0 - best)
     }
 
-    /// What a cell costs, and the sine of its least angle.
-    pub fn of_cell(&self, corners: [Point<2>; 3], guides: &[u32]) -> (f64, f64) {
+    /// What a cell costs.
+    pub fn of_cell(&self, corners: [Point<2>; 3], guides: &[u32]) -> CellCost {
         let [a, b, c] = corners;
         let lengths = [(a, b), (b, c), (c, a)].map(|(p, q)| distance_squared(&p, &q).sqrt());
         let shape = Shape::new(doubled_area(a, b, c), lengths);
@@ -158,13 +170,20 @@ impl<'a> Energy<'a> {
             let edges = [&edges[0], &edges[1], &edges[2]];
             cost += guides.iter().map(|&guide| self.of_guide(guide, edges)).sum::<f64>();
         }
-        (cost, shape.sine)
+        CellCost { cost, sine: shape.sine }
     }
 
-    /// Whether cells whose least sine was `old` may have `new` instead: the floor is kept where it was, what
-    /// is below it does not sink, and no cell gets so flat that rounding could hide an inversion.
+    /// The least sine that cells must keep whose least sine is `old`: the floor if they keep it, else what they have;
+    /// and no cell gets so flat that rounding could hide an inversion.
+    #[inline]
+    pub fn sine_to_keep(&self, old: f64) -> f64 {
+        old.min(self.sine_floor).max(FLATTEST)
+    }
+
+    /// Whether cells whose least sine was `old` may have `new` instead: the floor is kept where it was kept, cells
+    /// below it do not sink, and no cell gets so flat that rounding could hide an inversion.
     #[inline]
     pub fn allows(&self, old: f64, new: f64) -> bool {
-        new >= old.min(self.sine_floor) && new > 1e-7
+        new >= old.min(self.sine_floor) && new > FLATTEST
     }
 }

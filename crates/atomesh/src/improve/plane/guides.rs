@@ -1,12 +1,11 @@
 //! Guides: points on the valleys of b that edges should follow.
 //!
-//! Found from b as the run made it, whose deviation is about a sample already: it is smoothed by as much more as
-//! makes max(1, d/6) in all. Valleys pull alike, whatever their depth; which are deep enough is measured
-//! against the deepest tenth of them, since smoothing thin features took most of their depth.
+//! They are found from b as the run made it. Its features have a deviation of about a sample already, and it is
+//! smoothed so far that they have max(1, d/6) in all. Valleys pull alike, whatever their depth. The least depth that
+//! counts is relative to the deepest tenth of them, since smoothing thin features took most of their depth.
 
 use crate::crests::{FeaturePoint, ValleySearch, bottoms, in_large_groups, strongest};
-use crate::fields::Fields;
-use crate::fields::ScalarField;
+use crate::fields::{FieldsView, ScalarField};
 use crate::geometry::Point;
 use crate::watch::{Cancelled, Phase, Watch};
 
@@ -17,29 +16,28 @@ const LEAST_DEPTH: f32 = 0.05;
 const DEPTH_SHARE: f32 = 0.22;
 /// The least square of the added deviation, in samples: derivatives of less are those of noise.
 const LEAST_VARIANCE: f64 = 0.8;
-/// What a missed length of valley, over d, costs against a lost unit of a cell's q, times β/(1 − β).
+/// The cost of a missed length of valley, over d, where β = 1/2; a lost unit of a cell's q costs 1.
 const PULL: f64 = 5.0;
 /// The greatest β/(1 − β).
 const GREATEST_ODDS: f64 = 4.0;
 
-/// A point on a valley, in lattice space.
+/// A point on a valley that edges should follow.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(super) struct Guide {
-    pub position: Point<2>,
-    /// The unit normal of the valley.
-    pub normal: Point<2>,
-    /// What missing it costs.
+    /// The point, in lattice space.
+    pub at: FeaturePoint<2>,
+    /// What it costs if no edge follows it.
     pub pull: f64,
-    /// 1/τ², τ the distance that counts as near: a sample, or 0.1 d if that is more.
+    /// 1/τ² with τ the distance that counts as near: a sample, or 0.1 d if that is more.
     pub inverse_reach_squared: f64,
 }
 
 /// The guides of b where β is above 0.
-pub(super) fn guides(
-    fields: Fields<'_, 2>,
+pub(super) fn find_guides(
+    fields: FieldsView<'_, 2>,
     watch: &mut dyn Watch,
 ) -> Result<Vec<Guide>, Cancelled> {
-    let Fields { potential, weight, distance } = fields;
+    let FieldsView { potential, weight, distance } = fields;
     if weight.as_constant() == Some(0.0) || potential.range().0 > -LEAST_DEPTH {
         return Ok(Vec::new());
     }
@@ -56,8 +54,7 @@ pub(super) fn guides(
         let weight = weight.at(&position);
         let odds = (weight / (1.0 - weight)).min(GREATEST_ODDS);
         Guide {
-            position,
-            normal: slope.map(|x| x / length),
+            at: FeaturePoint { position, normal: slope.map(|x| x / length), ..*bottom },
             pull: PULL * odds * step / d,
             inverse_reach_squared: step.max(0.1 * d).powi(-2),
         }

@@ -1,9 +1,9 @@
 //! Moving points, one star at a time.
 //!
 //! A point tries its neighbours' centre, the valley beside it and steps along that, and steps in a few
-//! directions whose length follows its success; the best place that keeps the floor wins. The star's outline does
-//! not change, so its guides are shared out anew among its cells. Points without a common cell do not know
-//! of each other: they are tried at the same time, by colours, with the same result at any thread count.
+//! directions. The length of its steps grows with success. The best place that keeps the floor wins. The star's
+//! outline does not change, so its guides are shared out again among its cells. Points without a common cell do not
+//! affect each other: they are tried in parallel, by colours, with the same result at any thread count.
 
 use rayon::prelude::*;
 
@@ -11,34 +11,36 @@ use crate::fields::NominalDistance;
 use crate::geometry::{Point, difference, distance_squared, dot};
 
 use super::energy::{Energy, least_sine};
-use super::star::Star;
+use super::star::{Limits, Star, StarCell};
 use super::swaps::LEAST_GAIN;
-use super::triangles::{Pair, Triangles};
+use super::triangles::{CellPair, Triangles};
 
-/// The first step, the least and the greatest, over d.
+/// The length of a point's first step, over d.
 const FIRST_STEP: f64 = 0.2;
+/// The least and the greatest length of a step, over d.
 const LEAST_STEP: f64 = 0.02;
 const GREATEST_STEP: f64 = 0.3;
 /// Directions tried.
 const DIRECTIONS: usize = 4;
-/// Points that one thread tries at the least.
+/// The fewest points that a thread tries at a time.
 const POINTS_PER_TASK: usize = 16;
 
-/// What is known of the points.
+/// Moves points, and knows for which of them trying is worth while: those that are *awake*.
 pub(super) struct Mover {
     freedom: Vec<u8>,
-    /// d at each point where it was first.
+    /// d where each point was at first.
     distances: Vec<f64>,
-    /// The length of the next step over d; 0: nothing is to be gained.
+    /// The length of the next step over d; 0 for a point that has never been awake.
     steps: Vec<f64>,
-    /// Whether a cell of the point has changed since swaps were tried, and since the point was.
+    /// Whether a cell of the point has changed since swaps were tried.
     changed: Vec<bool>,
+    /// Whether a cell of the point has changed since its moves were tried.
     woken: Vec<bool>,
     rounds: usize,
 }
 
 impl Mover {
-    /// Points of cells with guides, or below the floor, are awake; others wake if a neighbour moves far.
+    /// Points of cells that hold guides or are below the floor are awake; others wake if a neighbour moves far.
     pub fn new(
         triangles: &Triangles,
         freedom: &[u8],
@@ -65,13 +67,13 @@ impl Mover {
         }
     }
 
-    /// Whether a swap of the pair might do what it could not before.
-    pub fn is_changed(&self, pair: &Pair) -> bool {
+    /// Whether a swap of the pair may gain although it did not before.
+    pub fn is_changed(&self, pair: &CellPair) -> bool {
         pair.edge.iter().chain(&pair.apices).any(|&point| self.changed[point as usize])
     }
 
     /// Lets the points of a swapped pair try again.
-    pub fn wake(&mut self, pair: &Pair) {
+    pub fn wake(&mut self, pair: &CellPair) {
         for &point in pair.edge.iter().chain(&pair.apices) {
             self.changed[point as usize] = true;
             self.woken[point as usize] = true;
@@ -85,13 +87,13 @@ impl Mover {
         self.distances[point as usize]
     }
 
-    /// Whether a point may be taken away: it moves freely, and it is or was awake.
+    /// Whether a point may be taken away: it moves freely, and is or was awake.
     pub fn may_go(&self, point: u32) -> bool {
-        self.freedom[point as usize] == 0b11 && self.is_reached(point)
+        self.freedom[point as usize] == 0b11 && self.has_been_awake(point)
     }
 
     /// Whether a point is or was awake.
-    pub fn is_reached(&self, point: u32) -> bool {
+    pub fn has_been_awake(&self, point: u32) -> bool {
         self.steps[point as usize] > 0.0
     }
 
@@ -150,7 +152,7 @@ impl Mover {
                     self.wake_star(&star);
                 }
                 let cells = std::mem::take(&mut star.cells);
-                star.share_out(triangles, energy, |sector| cells[sector].0, place);
+                star.share_out(triangles, energy, |sector| cells[sector].cell, place);
                 star.cells = cells;
                 triangles.points[point as usize] = place;
             }
@@ -170,9 +172,9 @@ impl Mover {
         for point in (0..triangles.points.len() as u32).filter(is_awake) {
             triangles.star(point, &mut star);
             let mut used = 0_u64;
-            for &(_, a, b) in &star {
-                used |= 1_u64.checked_shl(taken[a as usize].into()).unwrap_or(0);
-                used |= 1_u64.checked_shl(taken[b as usize].into()).unwrap_or(0);
+            for &StarCell { first, second, .. } in &star {
+                used |= 1_u64.checked_shl(taken[first as usize].into()).unwrap_or(0);
+                used |= 1_u64.checked_shl(taken[second as usize].into()).unwrap_or(0);
             }
             let colour = used.trailing_ones().min(63) as usize;
             taken[point as usize] = colour as u8;
@@ -186,8 +188,8 @@ impl Mover {
 
     /// Lets the points of a star try again.
     fn wake_star(&mut self, star: &Star) {
-        for &(_, a, b) in &star.cells {
-            for point in [a, b] {
+        for &StarCell { first, second, .. } in &star.cells {
+            for point in [first, second] {
                 let i = point as usize;
                 self.changed[i] = true;
                 self.woken[i] = true;
@@ -205,9 +207,9 @@ impl Mover {
         let step = self.steps[point as usize] * self.distances[point as usize];
         let least = star.least_sine();
         let start = star.center;
-        let mut best = star.energy(energy, start, f64::INFINITY, f64::NEG_INFINITY)? - LEAST_GAIN;
+        let now = star.energy(energy, start, Limits::NONE)?;
+        let mut limits = Limits { energy: now - LEAST_GAIN, sine: energy.sine_to_keep(least) };
         let mut place = None;
-        let floor = least.min(energy.sine_floor).max(1e-7);
         let turn = 0.37 * self.rounds as f64 + 0.61 * f64::from(point);
         let places = Places::new(star, energy, step, turn);
         for k in 0..places.count() {
@@ -218,9 +220,9 @@ impl Mover {
                 }
             }
             if x != start
-                && let Some(lower) = star.energy(energy, x, best, floor)
+                && let Some(lower) = star.energy(energy, x, limits)
             {
-                best = lower;
+                limits.energy = lower;
                 place = Some(x);
             }
         }
@@ -233,8 +235,15 @@ struct Places {
     /// The length of steps, and the direction of the first.
     step: f64,
     turn: f64,
-    /// The foot of the point on the nearest valley, and the valley's direction.
-    valley: Option<(Point<2>, Point<2>)>,
+    valley: Option<NearestValley>,
+}
+
+/// The valley nearest to a point, as a line.
+struct NearestValley {
+    /// The nearest place on it.
+    foot: Point<2>,
+    /// Its direction, of length 1.
+    tangent: Point<2>,
 }
 
 impl Places {
@@ -249,8 +258,8 @@ impl Places {
     /// The k-th place.
     fn at(&self, star: &Star, k: usize) -> Point<2> {
         let (start, step) = (star.center, self.step);
-        match self.valley {
-            Some((foot, tangent)) if k > DIRECTIONS => {
+        match &self.valley {
+            Some(NearestValley { foot, tangent }) if k > DIRECTIONS => {
                 let along = step * [0.0, 1.0, -1.0][k - DIRECTIONS - 1];
                 [foot[0] + along * tangent[0], foot[1] + along * tangent[1]]
             }
@@ -272,12 +281,13 @@ fn half_way_to_the_middle(star: &Star) -> Point<2> {
     })
 }
 
-/// The foot of the centre on the line through the nearest guide, and the line's direction.
-fn nearest_valley(star: &Star, energy: &Energy<'_>) -> Option<(Point<2>, Point<2>)> {
+/// The line through the guide nearest to the star's centre.
+fn nearest_valley(star: &Star, energy: &Energy<'_>) -> Option<NearestValley> {
     let guides = star.guides.iter().map(|&guide| &energy.guides[guide as usize]);
     let far = |p: &Point<2>| distance_squared(p, &star.center);
-    let guide = guides.min_by(|a, b| far(&a.position).total_cmp(&far(&b.position)))?;
-    let n = guide.normal;
-    let off = dot(&difference(&guide.position, &star.center), &n);
-    Some(([star.center[0] + off * n[0], star.center[1] + off * n[1]], [-n[1], n[0]]))
+    let nearest = guides.min_by(|a, b| far(&a.at.position).total_cmp(&far(&b.at.position)))?;
+    let n = nearest.at.normal;
+    let off = dot(&difference(&nearest.at.position, &star.center), &n);
+    let foot = [star.center[0] + off * n[0], star.center[1] + off * n[1]];
+    Some(NearestValley { foot, tangent: [-n[1], n[0]] })
 }

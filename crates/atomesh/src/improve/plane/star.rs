@@ -1,16 +1,39 @@
-//! The cells around a point, and what they cost with the point elsewhere.
+//! The star of a point: the cells around it, and what they cost with the point elsewhere.
 
 use crate::geometry::{Point, difference, distance_squared, dot};
 
 use super::energy::{Edge, Energy, Shape, cross, least_sine};
 use super::triangles::Triangles;
 
+/// A cell of a star, and its corners after the star's centre, counter-clockwise.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct StarCell {
+    pub cell: u32,
+    pub first: u32,
+    pub second: u32,
+}
+
+/// What the cells of a star are to keep to.
+#[derive(Clone, Copy)]
+pub(super) struct Limits {
+    /// Their energy is below this.
+    pub energy: f64,
+    /// The sine of each one's least angle is no less than this.
+    pub sine: f64,
+}
+
+impl Limits {
+    /// Nothing is kept to.
+    pub const NONE: Self = Self { energy: f64::INFINITY, sine: f64::NEG_INFINITY };
+}
+
 /// The cells around a point.
 #[derive(Default)]
 pub(super) struct Star {
     pub center: Point<2>,
-    /// Counter-clockwise, each with the two corners that follow the point.
-    pub cells: Vec<(u32, u32, u32)>,
+    /// Counter-clockwise.
+    pub cells: Vec<StarCell>,
+    /// Whether the cells close around the point, which then is not on the hull.
     pub is_closed: bool,
     /// The corners around, one more than cells: the first again at the end if they close.
     pub rim: Vec<Point<2>>,
@@ -29,11 +52,11 @@ impl Star {
         self.center = triangles.points[point as usize];
         self.rim.clear();
         self.guides.clear();
-        for &(cell, a, _) in &self.cells {
-            self.rim.push(triangles.points[a as usize]);
+        for &StarCell { cell, first, .. } in &self.cells {
+            self.rim.push(triangles.points[first as usize]);
             self.guides.extend_from_slice(triangles.guides_in(cell));
         }
-        let last = self.cells[self.cells.len() - 1].2;
+        let last = self.cells[self.cells.len() - 1].second;
         self.rim.push(triangles.points[last as usize]);
         self.measure_rim();
     }
@@ -53,15 +76,8 @@ impl Star {
         sines.fold(1.0, f64::min)
     }
 
-    /// The energy of the star's cells with the centre at `x`, if it is below `limit` and no cell's least sine
-    /// is below `floor`.
-    pub fn energy(
-        &mut self,
-        energy: &Energy<'_>,
-        x: Point<2>,
-        limit: f64,
-        floor: f64,
-    ) -> Option<f64> {
+    /// The energy of the star's cells with the centre at `x`, if they keep to the limits.
+    pub fn energy(&mut self, energy: &Energy<'_>, x: Point<2>, limits: Limits) -> Option<f64> {
         self.spokes.clear();
         self.spokes.extend(self.rim.iter().map(|corner| difference(corner, &x)));
         self.spoke_lengths.clear();
@@ -70,29 +86,29 @@ impl Star {
         for (i, &rim) in self.rim_lengths.iter().enumerate() {
             let area = cross(self.spokes[i], self.spokes[i + 1]);
             let shape = Shape::new(area, [self.spoke_lengths[i], self.spoke_lengths[i + 1], rim]);
-            if shape.sine < floor {
+            if shape.sine < limits.sine {
                 return None;
             }
             sum += energy.of_shape(shape);
         }
         if self.guides.is_empty() {
-            return (sum < limit).then_some(sum);
+            return (sum < limits.energy).then_some(sum);
         }
         self.spoke_edges.clear();
         self.spoke_edges.extend(self.rim.iter().map(|&corner| Edge::new(x, corner)));
         for &guide in &self.guides {
-            if sum >= limit {
+            if sum >= limits.energy {
                 return None;
             }
-            let sector = self.sector(difference(&energy.guides[guide as usize].position, &x));
+            let sector = self.sector(difference(&energy.guides[guide as usize].at.position, &x));
             let [a, b] = [&self.spoke_edges[sector], &self.spoke_edges[sector + 1]];
             sum += energy.of_guide(guide, [a, b, &self.rim_edges[sector]]);
         }
-        (sum < limit).then_some(sum)
+        (sum < limits.energy).then_some(sum)
     }
 
-    /// The cell, by its place in the star, that a point of the star lies in, given from the centre: between
-    /// the spokes before and after it. Where rounding leaves none, the one that fits best.
+    /// The place in the star of the cell, between the spokes before and after it, that holds a point given from the
+    /// centre. Where rounding leaves none, the cell that fits best.
     #[inline]
     fn sector(&self, from_center: Point<2>) -> usize {
         let mut best = (f64::NEG_INFINITY, 0);
@@ -128,7 +144,7 @@ impl Star {
             triangles.guides_in_mut(cells(place)).clear();
         }
         for &guide in &self.guides {
-            let sector = self.sector(difference(&energy.guides[guide as usize].position, &x));
+            let sector = self.sector(difference(&energy.guides[guide as usize].at.position, &x));
             triangles.guides_in_mut(cells(sector)).push(guide);
         }
     }

@@ -1,10 +1,10 @@
 //! Swapping the diagonal of two triangles.
 
-use super::energy::{Energy, doubled_area};
+use super::energy::{CellCost, Energy, doubled_area};
 use super::moves::Mover;
-use super::triangles::{Pair, Triangles};
+use super::triangles::{CellPair, Triangles};
 
-/// The least gain that counts: less is rounding.
+/// The least gain that counts; less may be rounding.
 pub(super) const LEAST_GAIN: f64 = 1e-9;
 
 /// Swaps whatever lowers the energy, pair after pair, where something has changed since the last time.
@@ -35,10 +35,10 @@ pub(super) fn swap_all(triangles: &mut Triangles, energy: &Energy<'_>, mover: &m
 fn lowers(
     triangles: &Triangles,
     energy: &Energy<'_>,
-    pair: &Pair,
+    pair: &CellPair,
     guides: &mut [Vec<u32>; 2],
 ) -> bool {
-    let Pair { cells, edge, apices } = *pair;
+    let CellPair { cells, edge, apices } = *pair;
     let [a, b] = edge.map(|point| triangles.points[point as usize]);
     let [v, u] = apices.map(|point| triangles.points[point as usize]);
     if doubled_area(v, a, u) <= 0.0 || doubled_area(u, b, v) <= 0.0 {
@@ -46,7 +46,7 @@ fn lowers(
     }
     guides.iter_mut().for_each(Vec::clear);
     for &guide in cells.iter().flat_map(|&cell| triangles.guides_in(cell)) {
-        let p = energy.guides[guide as usize].position;
+        let p = energy.guides[guide as usize].at.position;
         guides[usize::from(doubled_area(v, u, p) > 0.0)].push(guide);
     }
     let old = [
@@ -54,6 +54,7 @@ fn lowers(
         energy.of_cell([u, b, a], triangles.guides_in(cells[1])),
     ];
     let new = [energy.of_cell([v, a, u], &guides[0]), energy.of_cell([u, b, v], &guides[1])];
-    let least = |pair: [(f64, f64); 2]| pair[0].1.min(pair[1].1);
-    energy.allows(least(old), least(new)) && new[0].0 + new[1].0 < old[0].0 + old[1].0 - LEAST_GAIN
+    let least = |pair: [CellCost; 2]| pair[0].sine.min(pair[1].sine);
+    energy.allows(least(old), least(new))
+        && new[0].cost + new[1].cost < old[0].cost + old[1].cost - LEAST_GAIN
 }

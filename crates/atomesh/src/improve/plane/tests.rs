@@ -6,11 +6,10 @@ use rand_pcg::Pcg64;
 use super::super::{Align, ImproveError, ImproveOptions, ImproveReport, Improver};
 use super::PlaneImprover;
 use super::energy::{Edge, Energy, Shape, least_sine};
-use super::guides::{Guide, guides};
+use super::guides::{Guide, find_guides};
 use super::triangles::Triangles;
-use crate::fields::Fields;
-use crate::fields::NominalDistance;
-use crate::fields::{ImageWeight, Interpolation, ScalarField};
+use crate::crests::FeaturePoint;
+use crate::fields::{FieldsView, ImageWeight, Interpolation, NominalDistance, ScalarField};
 use crate::geometry::{Bounds, Point, difference, dot};
 use crate::image::Grid;
 use crate::lattice::{Crystal, GrowOptions, grow};
@@ -56,7 +55,7 @@ impl Scene {
             let p = [(i % columns) as f64 * grid.step[0], (i / columns) as f64 * grid.step[1]];
             (-depth * (-0.5 * (line.off(&p) / 1.5).powi(2)).exp()) as f32
         });
-        let potential = ScalarField::new(grid, samples.collect(), Interpolation::Spline);
+        let potential = ScalarField::potential(grid, samples.collect(), Interpolation::Spline);
         Self {
             potential: potential.unwrap(),
             weight: ImageWeight::constant(0.45).unwrap(),
@@ -65,8 +64,8 @@ impl Scene {
         }
     }
 
-    fn fields(&self) -> Fields<'_, 2> {
-        Fields { potential: &self.potential, weight: &self.weight, distance: &self.distance }
+    fn fields(&self) -> FieldsView<'_, 2> {
+        FieldsView { potential: &self.potential, weight: &self.weight, distance: &self.distance }
     }
 
     fn bounds(&self) -> Bounds<2> {
@@ -174,15 +173,15 @@ fn guides_lie_on_the_line_with_its_normal() {
     for step in [[1.0, 1.0], [1.0, 2.0]] {
         let shape = [97, (80.0 / step[1]) as usize + 1];
         let scene = Scene::on(Grid { shape, step }, 33.0, 0.8);
-        let found = guides(scene.fields(), &mut Silent).unwrap();
+        let found = find_guides(scene.fields(), &mut Silent).unwrap();
         assert!(found.len() > 60, "{}", found.len());
         let inside =
             |p: &Point<2>| (0..2).all(|k| p[k] > 6.0 && p[k] < scene.bounds().extent()[k] - 6.0);
-        for guide in found.iter().filter(|guide| inside(&guide.position)) {
+        for guide in found.iter().filter(|guide| inside(&guide.at.position)) {
             // a Newton step from 0.6 samples on a valley of about that variance is off by a tenth of a
             // sample; where samples are oblong the Hessian's eigenvector leans a little
-            assert!(scene.line.off(&guide.position).abs() < 0.15 * step[1], "{guide:?}");
-            assert!(dot(&guide.normal, &scene.line.normal).abs() > 0.99, "{guide:?}");
+            assert!(scene.line.off(&guide.at.position).abs() < 0.15 * step[1], "{guide:?}");
+            assert!(dot(&guide.at.normal, &scene.line.normal).abs() > 0.99, "{guide:?}");
         }
     }
 }
@@ -376,16 +375,16 @@ fn beyond_the_outline_of_a_mesh_nothing_guides() {
     let number = |c: &u32| used.binary_search(c).unwrap() as u32;
     let points: Vec<Point<2>> = used.iter().map(|&c| mesh.points()[c as usize]).collect();
     let part = Mesh::new(points.clone(), corners.iter().map(number).collect()).unwrap();
-    let found = guides(scene.fields(), &mut Silent).unwrap();
+    let found = find_guides(scene.fields(), &mut Silent).unwrap();
     let triangles = Triangles::new(part.clone(), &found);
     let held: Vec<u32> =
         (0..triangles.len() as u32).flat_map(|c| triangles.guides_in(c).to_vec()).collect();
     let outside = |i: &u32| {
-        let p = found[*i as usize].position;
+        let p = found[*i as usize].at.position;
         p[0] > x + 8.0 && p[1] < y - 8.0
     };
     assert!(!held.iter().any(outside));
-    let inside = found.iter().filter(|g| g.position[0] < x - 8.0 || g.position[1] > y + 8.0);
+    let inside = found.iter().filter(|g| g.at.position[0] < x - 8.0 || g.at.position[1] > y + 8.0);
     assert!(held.len() >= inside.count());
     // the outline holds
     let hull: Vec<u32> = (part.facets().iter())
@@ -426,7 +425,8 @@ fn shapes_are_those_of_the_closed_forms() {
 
 /// A guide at a place, its valley along x.
 fn guide(position: Point<2>) -> Guide {
-    Guide { position, normal: [0.0, 1.0], pull: 1.0, inverse_reach_squared: 1.0 }
+    let at = FeaturePoint { index: 0, position, normal: [0.0, 1.0], strength: 1.0 };
+    Guide { at, pull: 1.0, inverse_reach_squared: 1.0 }
 }
 
 #[test]
@@ -456,29 +456,27 @@ fn slow_energy(mesh: &Mesh<2>, guides: &[Guide], energy: &Energy<'_>) -> f64 {
             let s = cells[cell];
             let corners = [s.first, s.others[0], s.others[1]];
             let area = |k: usize| {
-                super::energy::doubled_area(corners[k], corners[(k + 1) % 3], guide.position)
+                super::energy::doubled_area(corners[k], corners[(k + 1) % 3], guide.at.position)
             };
             area(0).min(area(1)).min(area(2))
         };
         let cell = (0..cells.len()).max_by(|&a, &b| depth(a).total_cmp(&depth(b))).unwrap();
         held[cell].push(i as u32);
     }
-    let of = |(s, held): (&crate::geometry::Simplex<2>, &Vec<u32>)| {
-        energy.of_cell([s.first, s.others[0], s.others[1]], held).0
-    };
-    cells.iter().zip(&held).map(of).sum()
+    let cells = cells.iter().map(|s| [s.first, s.others[0], s.others[1]]);
+    cells.zip(&held).map(|(corners, held)| energy.of_cell(corners, held).cost).sum()
 }
 
 #[test]
 fn rounds_lower_the_energy_that_is_summed_over_the_whole_mesh() {
     let scene = Scene::new(25.0, 1.0);
-    let found = guides(scene.fields(), &mut Silent).unwrap();
+    let found = find_guides(scene.fields(), &mut Silent).unwrap();
     let energy = Energy::new(&found, 20f64.to_radians().sin());
     let (mesh, freedom) = scene.scattered(3);
     let mut triangles = Triangles::new(mesh.clone(), &found);
     let fast = |t: &Triangles| -> f64 {
         let cells = 0..t.len() as u32;
-        cells.map(|c| energy.of_cell(t.corners_at(c), t.guides_in(c)).0).sum()
+        cells.map(|c| energy.of_cell(t.corners_at(c), t.guides_in(c)).cost).sum()
     };
     let mut before = fast(&triangles);
     // a guide on an edge may count for either side: its edges differ, and hardly its cost

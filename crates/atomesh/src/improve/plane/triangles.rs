@@ -1,10 +1,11 @@
-//! Triangles that can be swapped: who is beside whom, and which guides lie in which.
+//! Triangles that can be swapped and moved: who is beside whom, and which guides lie in which.
 
 use crate::geometry::{Bounds, Point};
 use crate::mesh::{Mesh, MeshError};
 
 use super::energy::doubled_area;
 use super::guides::Guide;
+use super::star::StarCell;
 
 /// No cell: beyond the hull.
 pub(super) const NONE: u32 = u32::MAX;
@@ -41,10 +42,11 @@ impl Triangles {
         }
         let empty = vec![Vec::new(); corners.len()];
         let mut triangles = Self { points, corners, neighbours, cell_of, guides: empty };
-        let starts = Starts::new(&triangles);
+        let starts = WalkStarts::new(&triangles);
         for (i, guide) in guides.iter().enumerate() {
             // beyond the outline of a mesh that is not convex there is nothing to guide
-            if let Some(cell) = triangles.locate(guide.position, starts.near(guide.position)) {
+            if let Some(cell) = triangles.locate(guide.at.position, starts.near(guide.at.position))
+            {
                 triangles.guides[cell as usize].push(i as u32);
             }
         }
@@ -108,9 +110,9 @@ impl Triangles {
         usize::from(corners[1] == point) + 2 * usize::from(corners[2] == point)
     }
 
-    /// The cells around a point, counter-clockwise, each with the two corners that follow the point; whether
-    /// they close. Those of a point of the hull begin and end at it.
-    pub fn star(&self, point: u32, star: &mut Vec<(u32, u32, u32)>) -> bool {
+    /// Puts the cells around a point into `star`, counter-clockwise; whether they close. Those of a point of the hull
+    /// begin and end at the hull.
+    pub fn star(&self, point: u32, star: &mut Vec<StarCell>) -> bool {
         star.clear();
         let first = self.cell_of[point as usize];
         let mut start = first;
@@ -125,7 +127,8 @@ impl Triangles {
         loop {
             let place = self.place(cell, point);
             let corners = &self.corners[cell as usize];
-            star.push((cell, corners[(place + 1) % 3], corners[(place + 2) % 3]));
+            let [first, second] = [1, 2].map(|k| corners[(place + k) % 3]);
+            star.push(StarCell { cell, first, second });
             cell = self.neighbours[cell as usize][(place + 1) % 3];
             if cell == NONE || cell == start {
                 return cell == start;
@@ -134,7 +137,7 @@ impl Triangles {
     }
 
     /// The pair of cells beside the edge across from a corner; `None` on the hull.
-    pub fn pair(&self, cell: u32, place: usize) -> Option<Pair> {
+    pub fn pair(&self, cell: u32, place: usize) -> Option<CellPair> {
         let other = self.neighbours[cell as usize][place];
         if other == NONE {
             return None;
@@ -143,12 +146,12 @@ impl Triangles {
         let [apex, a, b] = [0, 1, 2].map(|k| corners[(place + k) % 3]);
         let beyond = self.corners[other as usize].into_iter().find(|&c| c != a && c != b);
         let beyond = beyond.expect("a cell has a corner off an edge");
-        Some(Pair { cells: [cell, other], edge: [a, b], apices: [apex, beyond] })
+        Some(CellPair { cells: [cell, other], edge: [a, b], apices: [apex, beyond] })
     }
 
     /// Gives a pair of cells the other diagonal, with these guides in the new cells.
-    pub fn swap(&mut self, pair: &Pair, guides: [&mut Vec<u32>; 2]) {
-        let Pair { cells: [cell, other], edge: [a, b], apices: [v, u] } = *pair;
+    pub fn swap(&mut self, pair: &CellPair, guides: [&mut Vec<u32>; 2]) {
+        let CellPair { cells: [cell, other], edge: [a, b], apices: [v, u] } = *pair;
         let (at, over) = (self.place(cell, v), self.place(other, u));
         // across from a, b in the one cell and from b, a in the other
         let across = |cell: u32, place: usize| self.neighbours[cell as usize][place % 3];
@@ -168,20 +171,20 @@ impl Triangles {
         }
     }
 
-    /// Takes a point away whose cells, counter-clockwise, close: the `to`-th corner around takes its place in
-    /// all of them but the two that have both, which go.
-    pub fn collapse(&mut self, point: u32, star: &[(u32, u32, u32)], to: usize) {
+    /// Takes a point away whose star closes: the `to`-th corner around takes its place in all cells of the star but
+    /// the two that have both, which go.
+    pub fn collapse(&mut self, point: u32, star: &[StarCell], to: usize) {
         let at = |place: usize| star[place % star.len()];
         let count = star.len();
-        let (gone, corner, next) = at(to);
-        let (also_gone, previous, _) = at(to + count - 1);
-        let (after, before) = (at(to + 1).0, at(to + count - 2).0);
+        let StarCell { cell: gone, first: corner, second: next } = at(to);
+        let StarCell { cell: also_gone, first: previous, .. } = at(to + count - 1);
+        let (after, before) = (at(to + 1).cell, at(to + count - 2).cell);
         for (gone, beside) in [(gone, after), (also_gone, before)] {
             let beyond = self.neighbours[gone as usize][self.place(gone, point)];
             self.replace(beside, gone, beyond);
             self.replace(beyond, gone, beside);
         }
-        for &(cell, ..) in star {
+        for &StarCell { cell, .. } in star {
             let place = self.place(cell, point);
             self.corners[cell as usize][place] = corner;
         }
@@ -198,8 +201,8 @@ impl Triangles {
 
     /// Puts a new point into a pair of cells, which become four: those along the sides from the pair's first
     /// corner of the edge to the far apex, and so on around. Returns them.
-    pub fn split(&mut self, pair: &Pair, x: Point<2>) -> [u32; 4] {
-        let Pair { cells: [cell, other], edge: [a, b], apices: [v, u] } = *pair;
+    pub fn split(&mut self, pair: &CellPair, x: Point<2>) -> [u32; 4] {
+        let CellPair { cells: [cell, other], edge: [a, b], apices: [v, u] } = *pair;
         let (at, over) = (self.place(cell, v), self.place(other, u));
         let across = |cell: u32, place: usize| self.neighbours[cell as usize][place % 3];
         let (beside_bv, beside_va) = (across(cell, at + 1), across(cell, at + 2));
@@ -257,21 +260,29 @@ impl Triangles {
 
 /// Two cells that share an edge: v a b and u b a, for the edge a b and the apices v u.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub(super) struct Pair {
+pub(super) struct CellPair {
     pub cells: [u32; 2],
     pub edge: [u32; 2],
     pub apices: [u32; 2],
 }
 
+impl CellPair {
+    /// All corners, counter-clockwise.
+    pub fn corners(&self) -> [u32; 4] {
+        let ([a, b], [v, u]) = (self.edge, self.apices);
+        [a, u, b, v]
+    }
+}
+
 /// A cell near any place, from which to walk: of squares about as large as two cells, one cell each.
-struct Starts {
+struct WalkStarts {
     low: Point<2>,
     side: f64,
     columns: usize,
     cells: Vec<u32>,
 }
 
-impl Starts {
+impl WalkStarts {
     fn new(triangles: &Triangles) -> Self {
         let bounds = Bounds::of(&triangles.points);
         let (low, extent) = bounds.map_or(([0.0; 2], [0.0; 2]), |b| (b.min, b.extent()));

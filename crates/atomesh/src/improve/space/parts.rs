@@ -1,35 +1,60 @@
-//! A mesh in parts that are worked on side by side.
+//! A mesh in parts that are worked on in parallel.
 //!
 //! Points are halved again and again across their longest side, so that parts depend on places and not on threads. A
-//! cell belongs to the least part of its corners. A point with cells in other parts is held, and facets between parts
-//! stay; what a pass leaves undone there the next does, which cuts elsewhere and looks at the neighbourhood of held
-//! points alone.
+//! cell belongs to the lowest-numbered part of its corners. A point with cells in other parts is held, and facets
+//! between parts stay. The next pass, which cuts elsewhere, does what was left undone there, and looks at the
+//! neighbourhood of held points alone.
 
-use super::patch::{NONE, Patch};
+use super::shape::shape;
+use super::tetrahedra::{NONE, Tetrahedra};
 use crate::geometry::{Bounds, Point};
+use rayon::prelude::*;
 
 /// The points of a part, about: enough that few are held, few enough for all cores and for a cache. Tests cut small meshes too.
 const PART: usize = if cfg!(test) { 60 } else { 12_000 };
 
+/// Cells that one task measures.
+const BLOCK: usize = 1 << 13;
+
 /// Where each pass cuts: the share of the points before the cut.
 pub(super) const CUTS: [f64; 3] = [0.5, 0.3, 0.64];
 
+/// How many edges from held points the next pass looks.
+const LAYERS: usize = 1;
+
 /// The mesh between passes.
-pub(super) struct Whole {
+pub(super) struct WholeMesh {
     pub points: Vec<Point<3>>,
-    pub freedom: Vec<u8>,
-    pub sides: Vec<u8>,
+    /// As in [`Tetrahedra`].
+    freedom: Vec<u8>,
+    sides: Vec<u8>,
     pub corners: Vec<[u32; 4]>,
 }
 
-/// A part: its patch, and which points of the mesh the patch's are.
+/// A part of the mesh. Its points are numbered anew.
 pub(super) struct Part {
-    pub patch: Patch,
+    pub tetrahedra: Tetrahedra,
+    /// The mesh's number of each point.
     pub points: Vec<u32>,
-    /// Points of the patch that have cells elsewhere.
+    /// The points with cells in other parts.
     pub held: Vec<u32>,
-    /// Which points of the patch no earlier pass has been free to move.
-    pub open: Vec<bool>,
+    /// Whether every earlier pass has held the point.
+    pub is_pending: Vec<bool>,
+}
+
+/// The dihedral angles of a mesh.
+pub(super) struct Angles {
+    /// The greatest cosine.
+    worst_cosine: f64,
+    /// Cells with a cosine above the limit.
+    pub below: usize,
+}
+
+impl Angles {
+    /// The least angle, in degrees; 0 if a cell is inverted.
+    pub fn least(&self) -> f64 {
+        self.worst_cosine.clamp(-1.0, 1.0).acos().to_degrees()
+    }
 }
 
 /// The part of each point, and how many parts there are.
@@ -51,8 +76,7 @@ fn parts_of(points: &[Point<3>], cut: f64) -> (Vec<u32>, usize) {
 fn halves<'a>(points: &[Point<3>], slice: &'a mut [u32], cut: f64) -> [&'a mut [u32]; 2] {
     let mut bounds = Bounds { min: [f64::INFINITY; 3], max: [f64::NEG_INFINITY; 3] };
     slice.iter().for_each(|&i| bounds.include(&points[i as usize]));
-    let extent = bounds.extent();
-    let axis = (1..3).fold(0, |best, k| if extent[k] > extent[best] { k } else { best });
+    let axis = bounds.longest_axis();
     let middle = (slice.len() as f64 * cut) as usize;
     if middle > 0 && middle < slice.len() {
         slice.select_nth_unstable_by(middle, |&a, &b| {
@@ -63,7 +87,53 @@ fn halves<'a>(points: &[Point<3>], slice: &'a mut [u32], cut: f64) -> [&'a mut [
     [low, high]
 }
 
-impl Whole {
+impl WholeMesh {
+    /// The mesh as it is given.
+    pub fn new(points: Vec<Point<3>>, freedom: &[u8], corners: &[u32], bounds: &Bounds<3>) -> Self {
+        let sides: Vec<u8> = points.iter().map(|p| bounds.sides(p, 0.0)).collect();
+        // whatever the lattice says, a point on a side stays on it
+        let freedom = freedom.iter().zip(&points).map(|(f, p)| f & bounds.freedom(p)).collect();
+        let corners = corners.chunks_exact(4).map(|c| [c[0], c[1], c[2], c[3]]).collect();
+        Self { points, freedom, sides, corners }
+    }
+
+    /// Drops points that no cell has any more.
+    pub fn drop_loose_points(&mut self) {
+        let mut number = vec![NONE; self.points.len()];
+        self.corners.iter().flatten().for_each(|&c| number[c as usize] = 0);
+        if !number.contains(&NONE) {
+            return;
+        }
+        let mut count = 0;
+        for (number, point) in number.iter_mut().zip(0..).filter(|(n, _)| **n == 0) {
+            self.points[count as usize] = self.points[point];
+            *number = count;
+            count += 1;
+        }
+        self.points.truncate(count as usize);
+        self.corners.iter_mut().flatten().for_each(|c| *c = number[*c as usize]);
+    }
+
+    /// The angles of all cells.
+    pub fn angles(&self, cosine_limit: f64) -> Angles {
+        let of = |cells: &[[u32; 4]]| {
+            let mut angles = Angles { worst_cosine: -1.0, below: 0 };
+            for cell in cells {
+                let [p, q, r, s] = cell.map(|c| self.points[c as usize]);
+                let cosine = shape(&p, &q, &r, &s).cosine;
+                angles.worst_cosine = angles.worst_cosine.max(cosine);
+                angles.below += usize::from(cosine > cosine_limit);
+            }
+            angles
+        };
+        let blocks = self.corners.par_chunks(BLOCK).map(of);
+        let none = || Angles { worst_cosine: -1.0, below: 0 };
+        blocks.reduce(none, |a, b| Angles {
+            worst_cosine: a.worst_cosine.max(b.worst_cosine),
+            below: a.below + b.below,
+        })
+    }
+
     /// The cells of each part, by their numbers; with `pending`, only those within some layers of its points.
     pub fn divide(&self, cut: f64, pending: Option<&[bool]>) -> Vec<Vec<u32>> {
         let (part, count) = parts_of(&self.points, cut);
@@ -134,8 +204,9 @@ impl Whole {
         }
         let at = points.iter().map(|&p| self.points[p as usize]).collect();
         let sides = points.iter().map(|&p| self.sides[p as usize]).collect();
-        let open = points.iter().map(|&p| pending.is_none_or(|open| open[p as usize])).collect();
-        Part { patch: Patch::new(at, freedom, sides, corners), points, held, open }
+        let was_held = |&p: &u32| pending.is_none_or(|pending| pending[p as usize]);
+        let is_pending = points.iter().map(was_held).collect();
+        Part { tetrahedra: Tetrahedra::new(at, freedom, sides, corners), points, held, is_pending }
     }
 
     /// Takes the cells and points of parts back, in place of the cells that they were made of.
@@ -143,10 +214,10 @@ impl Whole {
         divided.iter().flatten().for_each(|&cell| self.corners[cell as usize][0] = NONE);
         let mut dead = divided.iter().flatten().copied();
         for part in parts {
-            for (&point, at) in part.points.iter().zip(&part.patch.points) {
+            for (&point, at) in part.points.iter().zip(&part.tetrahedra.points) {
                 self.points[point as usize] = *at;
             }
-            for cell in part.patch.cells() {
+            for cell in part.tetrahedra.cells() {
                 let corners = cell.map(|c| part.points[c as usize]);
                 match dead.next() {
                     Some(slot) => self.corners[slot as usize] = corners,
@@ -157,6 +228,3 @@ impl Whole {
         self.corners.retain(|c| c[0] != NONE);
     }
 }
-
-/// How many edges from held points the next pass looks.
-const LAYERS: usize = 1;

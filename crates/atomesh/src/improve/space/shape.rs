@@ -9,19 +9,19 @@ use crate::geometry::{Point, cross, difference, dot};
 /// The shape of a tetrahedron.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(super) struct Shape {
-    /// The cosine of the least dihedral angle: 1/3 if equilateral, 1 if flat, [`UPSIDE_DOWN`] if not of positive
-    /// orientation for sure.
+    /// The cosine of the least dihedral angle: 1/3 if equilateral, 1 if flat, [`INVERTED`] unless the orientation is
+    /// positive for sure.
     pub cosine: f64,
     /// 3 · inradius / circumradius, 0 (flat) to 1 (equilateral).
     pub quality: f64,
 }
 
-/// The cosine of a cell that has no positive orientation: worse than that of any that has.
-pub(super) const UPSIDE_DOWN: f64 = 2.0;
+/// The cosine of an inverted cell: worse than that of any other.
+pub(super) const INVERTED: f64 = 2.0;
 
-/// The determinant's rounding error, as a share of the product of the edges' lengths: differences of coordinates
-/// are rounded by half an ulp each, products and sums some ten times more; 10⁻¹³ is a hundred times as much.
-/// A determinant above it has the sign of the exact one.
+/// A bound of the determinant's rounding error, over the product of the edges' lengths; a determinant above it has
+/// the sign of the exact one. Differences of coordinates are rounded by half an ulp each, products and sums some ten
+/// times more; 10⁻¹³ is a hundred times as much.
 const ROUNDING: f64 = 1e-13;
 
 /// The shape of the tetrahedron with these corners.
@@ -31,10 +31,10 @@ pub(super) fn shape(p: &Point<3>, q: &Point<3>, r: &Point<3>, s: &Point<3>) -> S
     let (a, b, c) = (cross(&v, &w), cross(&w, &u), cross(&u, &v));
     let determinant = dot(&u, &a);
     let (uu, vv, ww) = (dot(&u, &u), dot(&v, &v), dot(&w, &w));
-    // not `<=`: a NaN is no positive orientation either
+    // false for a NaN too
     let sound = determinant > 0.0 && determinant * determinant > ROUNDING * ROUNDING * uu * vv * ww;
     if !sound {
-        return Shape { cosine: UPSIDE_DOWN, quality: 0.0 };
+        return Shape { cosine: INVERTED, quality: 0.0 };
     }
     let o: Point<3> = std::array::from_fn(|k| -(a[k] + b[k] + c[k]));
     let length = |n: &Point<3>| dot(n, n).sqrt();
@@ -91,7 +91,7 @@ mod tests {
             let found = shape(&p[0], &p[1], &p[2], &p[3]);
             let Some((determinant, expected)) = twin(&p) else { return Ok(()) };
             if determinant < 0.0 {
-                prop_assert_eq!(found.cosine, UPSIDE_DOWN);
+                prop_assert_eq!(found.cosine, INVERTED);
             } else if determinant > 1e-4 {
                 // digits are lost as the determinant gets small, four to six of sixteen here
                 prop_assert!((found.quality - expected.quality).abs() < 1e-9);
@@ -101,11 +101,11 @@ mod tests {
     }
 
     #[test]
-    fn flat_and_turned_cells_are_no_cells() {
+    fn flat_and_inverted_cells_are_told() {
         let p = [[0.0; 3], [1.0, 0.0, 0.0], [0.0, 1.0, 0.0], [1.0, 1.0, 0.0], [0.0, 0.0, 1.0]];
-        assert_eq!(shape(&p[0], &p[1], &p[2], &p[3]).cosine, UPSIDE_DOWN);
-        assert_eq!(shape(&p[1], &p[0], &p[2], &p[4]).cosine, UPSIDE_DOWN);
+        assert_eq!(shape(&p[0], &p[1], &p[2], &p[3]).cosine, INVERTED);
+        assert_eq!(shape(&p[1], &p[0], &p[2], &p[4]).cosine, INVERTED);
         assert!(shape(&p[0], &p[1], &p[2], &p[4]).cosine < 1.0);
-        assert_eq!(shape(&[f64::NAN; 3], &p[1], &p[2], &p[4]).cosine, UPSIDE_DOWN);
+        assert_eq!(shape(&[f64::NAN; 3], &p[1], &p[2], &p[4]).cosine, INVERTED);
     }
 }

@@ -6,9 +6,9 @@ use crate::fields::{ImageWeight, Interpolation, ScalarField};
 use crate::image::Grid;
 use crate::mesh::Delaunay;
 use crate::watch::Silent;
-use patch::Patch;
+use edge_ring::{EdgeRing, MOST};
 use proptest::prelude::*;
-use ring::{MOST, Ring};
+use tetrahedra::Tetrahedra;
 
 /// The box of all tests but those of one cell.
 const SIDE: f64 = 12.0;
@@ -46,9 +46,9 @@ fn improve(
 ) -> Result<(Mesh<3>, ImproveReport), ImproveError> {
     let weight = ImageWeight::constant(beta).unwrap();
     let distance = NominalDistance::constant(potential.grid(), 3.0).unwrap();
-    let fields = Fields { potential, weight: &weight, distance: &distance };
+    let fields = FieldsView { potential, weight: &weight, distance: &distance };
     let freedom = vec![7; mesh.points().len()];
-    Space.improve(mesh, &freedom, fields, options, &mut Silent)
+    SpaceImprover.improve(mesh, &freedom, fields, options, &mut Silent)
 }
 
 /// A crystal whose points are moved at random: what a lattice is like.
@@ -63,7 +63,7 @@ fn crystal(shifts: &[f64]) -> Vec<Point<3>> {
 }
 
 fn sides(p: &Point<3>) -> u8 {
-    patch::sides_of(p, &Bounds { min: [0.0; 3], max: [SIDE; 3] })
+    Bounds { min: [0.0; 3], max: [SIDE; 3] }.sides(p, 0.0)
 }
 
 proptest! {
@@ -110,7 +110,7 @@ fn best_of_all(i: usize, j: usize, worth: &impl Fn(usize, usize, usize) -> f64) 
 }
 
 /// `count` cells around the edge from point 0 to point 1.
-fn wheel(count: usize, shifts: &[f64]) -> Patch {
+fn wheel(count: usize, shifts: &[f64]) -> Tetrahedra {
     let mut points = vec![[0.0, 0.0, -1.0], [0.0, 0.0, 1.0]];
     for n in 0..count {
         let (sine, cosine) = (std::f64::consts::TAU * n as f64 / count as f64).sin_cos();
@@ -120,7 +120,7 @@ fn wheel(count: usize, shifts: &[f64]) -> Patch {
     let at = |n: usize| 2 + (n % count) as u32;
     let cells = (0..count).map(|n| [0, 1, at(n), at(n + 1)]).collect();
     let all = points.len();
-    Patch::new(points, vec![7; all], vec![0; all], cells)
+    Tetrahedra::new(points, vec![7; all], vec![0; all], cells)
 }
 
 proptest! {
@@ -129,11 +129,11 @@ proptest! {
         count in 3..=MOST,
         shifts in prop::collection::vec(-0.5..0.5f64, 2 * MOST),
     ) {
-        let patch = wheel(count, &shifts);
-        let ring = Ring::around(&patch, 1, 0, 1).unwrap();
+        let tetrahedra = wheel(count, &shifts);
+        let ring = EdgeRing::around(&tetrahedra, 1, 0, 1).unwrap();
         prop_assert_eq!((ring.count, ring.cell_count), (count, count));
-        let worth = |ring: &Ring, i, k, j| {
-            let cosines = ring.pair(i, k, j).map(|c| patch.shape_of(&c).cosine);
+        let worth = |ring: &EdgeRing, i, k, j| {
+            let cosines = ring.pair(i, k, j).map(|c| tetrahedra.shape_of(&c).cosine);
             -cosines[0].max(cosines[1])
         };
         let all = |i, k, j| worth(&ring, i, k, j);
@@ -149,25 +149,26 @@ proptest! {
 }
 
 #[test]
-fn a_swap_leaves_neighbours_as_a_new_patch_would_have_them() {
-    let mut patch = wheel(5, &[0.0; 10]);
-    let ring = Ring::around(&patch, 0, 0, 1).unwrap();
-    let worth = |ring: &Ring, i, k, j| {
-        let cosines = ring.pair(i, k, j).map(|c| patch.shape_of(&c).cosine);
+fn a_swap_leaves_neighbours_as_cells_put_together_have_them() {
+    let mut tetrahedra = wheel(5, &[0.0; 10]);
+    let ring = EdgeRing::around(&tetrahedra, 0, 0, 1).unwrap();
+    let worth = |ring: &EdgeRing, i, k, j| {
+        let cosines = ring.pair(i, k, j).map(|c| tetrahedra.shape_of(&c).cosine);
         -cosines[0].max(cosines[1])
     };
     let filling = ring.fill(-1.0, worth, f64::min, f64::INFINITY).unwrap();
-    heal::remove_edge(&mut patch, &ring, &filling);
-    let cells: Vec<[u32; 4]> = patch.cells().copied().collect();
+    slivers::remove_edge(&mut tetrahedra, &ring, &filling);
+    let cells: Vec<[u32; 4]> = tetrahedra.cells().copied().collect();
     assert_eq!(cells.len(), 6);
-    let fresh = Patch::new(patch.points.clone(), vec![7; 7], vec![0; 7], cells);
-    let beyond = |patch: &Patch, cell: usize, k: usize| match patch.neighbours[cell][k] {
-        patch::NONE => None,
-        other => Some(patch.corners[other as usize]),
-    };
+    let fresh = Tetrahedra::new(tetrahedra.points.clone(), vec![7; 7], vec![0; 7], cells);
+    let beyond =
+        |tetrahedra: &Tetrahedra, cell: usize, k: usize| match tetrahedra.neighbours[cell][k] {
+            tetrahedra::NONE => None,
+            other => Some(tetrahedra.corners[other as usize]),
+        };
     for (cell, corners) in fresh.corners.iter().enumerate() {
-        let same = patch.corners.iter().position(|c| c == corners).unwrap();
-        (0..4).for_each(|k| assert_eq!(beyond(&patch, same, k), beyond(&fresh, cell, k)));
+        let same = tetrahedra.corners.iter().position(|c| c == corners).unwrap();
+        (0..4).for_each(|k| assert_eq!(beyond(&tetrahedra, same, k), beyond(&fresh, cell, k)));
     }
 }
 
@@ -226,9 +227,9 @@ fn a_floor_out_of_range_is_refused_and_a_watch_ends_the_work() {
     let potential = potential(sheet);
     let weight = ImageWeight::constant(0.4).unwrap();
     let distance = NominalDistance::constant(potential.grid(), 3.0).unwrap();
-    let fields = Fields { potential: &potential, weight: &weight, distance: &distance };
+    let fields = FieldsView { potential: &potential, weight: &weight, distance: &distance };
     let freedom = vec![7; mesh.points().len()];
     let options = ImproveOptions::for_dimension(3);
-    let ended = Space.improve(mesh, &freedom, fields, &options, &mut Never);
+    let ended = SpaceImprover.improve(mesh, &freedom, fields, &options, &mut Never);
     assert!(matches!(ended, Err(ImproveError::Cancelled(_))));
 }

@@ -14,7 +14,6 @@ use std::collections::{HashMap, HashSet};
 use super::Mesh;
 pub use check::TagsError;
 pub use names::{MASK_NAME, feature_name, interface_name, is_feature_name, region_name, side_name};
-pub(crate) use sides::sides_of;
 
 /// A named group of facets.
 #[derive(Clone, Debug, PartialEq, Eq)]

@@ -3,26 +3,15 @@
 use std::collections::HashMap;
 
 use super::{FacetGroup, Tags, ascending, side_name};
-use crate::geometry::{Bounds, Point};
+use crate::geometry::Bounds;
 use crate::mesh::Mesh;
-
-/// The sides of the box that a point is on, to a tolerance: bit 2 · axis, and 1 more at the axis' end. Points on one
-/// side have a bit in common.
-pub(crate) fn sides_of<const D: usize>(p: &Point<D>, bounds: &Bounds<D>, tolerance: f64) -> u8 {
-    (0..D).fold(0, |set, k| {
-        let low = u8::from((p[k] - bounds.min[k]).abs() <= tolerance);
-        let high = u8::from((p[k] - bounds.max[k]).abs() <= tolerance);
-        set | low << (2 * k) | high << (2 * k + 1)
-    })
-}
 
 impl<const D: usize> Tags<D> {
     /// The hull's facets by the side of the box that they lie on, normals outward: groups 1 `xmin`,
     /// 2 `xmax`, 3 `ymin` … `zmax`. A point is on a side if it is at most `tolerance` from it. `mesh` and `bounds` are in
     /// lattice coordinates; the groups also fit the mesh moved to the world. Cost: O(cells).
     pub fn sides(mesh: &Mesh<D>, bounds: &Bounds<D>, tolerance: f64) -> Self {
-        let on_sides: Vec<u8> =
-            mesh.points().iter().map(|p| sides_of(p, bounds, tolerance)).collect();
+        let on_sides: Vec<u8> = mesh.points().iter().map(|p| bounds.sides(p, tolerance)).collect();
         let mut groups: Vec<FacetGroup<D>> = (0..2 * D)
             .map(|side| FacetGroup {
                 id: side as u32 + 1,

@@ -1,0 +1,54 @@
+//! Pictures of the plane or of space, as a value: what callers that are generic over the dimension call.
+//!
+//! The functions behind it are compiled in this crate, once for each dimension.
+
+use atomesh::image::Image;
+use atomesh::mesh::{Mesh, PolyMesh};
+
+use crate::error::DrawError;
+use crate::flow::{FlowPicture, FlowStyle, draw_flow, draw_flow_slices};
+use crate::picture::Picture;
+use crate::plane::{draw_polygons, draw_triangles};
+use crate::slices::{draw_polyhedra, draw_slices};
+use crate::style::Style;
+
+/// How meshes of `D` dimensions, in sample coordinates, are drawn.
+#[derive(Clone, Copy, Debug)]
+pub struct Drawing<const D: usize> {
+    /// Draws triangles or tetrahedra over their image.
+    pub mesh: fn(&Image<D>, &Mesh<D>, &Style) -> Result<Picture, DrawError>,
+    /// Draws Voronoi cells over their image.
+    pub cells: fn(&Image<D>, &PolyMesh<D>, &Style) -> Result<Picture, DrawError>,
+    /// Draws flow.
+    pub flow: fn(&FlowPicture<'_, D>, &Style, &FlowStyle) -> Result<Picture, DrawError>,
+}
+
+impl Drawing<2> {
+    /// [`draw_triangles`], [`draw_polygons`] and [`draw_flow`].
+    #[inline(never)] // inlined elsewhere, it would have all functions compiled there
+    pub fn plane() -> Self {
+        Self { mesh: draw_triangles, cells: draw_polygons, flow: draw_flow }
+    }
+}
+
+impl Drawing<3> {
+    /// [`draw_slices`], [`draw_polyhedra`] and [`draw_flow_slices`], through the middle of the image, atoms drawn.
+    #[inline(never)]
+    pub fn space() -> Self {
+        Self {
+            mesh: |image, mesh, style| draw_slices(image, mesh, middle(image), &with_atoms(style)),
+            cells: |image, mesh, style| {
+                draw_polyhedra(image, mesh, middle(image), &with_atoms(style))
+            },
+            flow: |flow, style, flow_style| draw_flow_slices(flow, None, style, flow_style),
+        }
+    }
+}
+
+fn middle(image: &Image<3>) -> [usize; 3] {
+    image.frame().shape().map(|n| n / 2)
+}
+
+fn with_atoms(style: &Style) -> Style {
+    Style { atoms: true, ..style.clone() }
+}

@@ -1,0 +1,60 @@
+//! JPEG through the `zune-jpeg` crate: grey and colour of 8 bits.
+//!
+//! The orientation that a camera notes is not followed: row 0 is the first one stored.
+
+use std::io::Read;
+
+use atomesh::image::Samples;
+use zune_jpeg::JpegDecoder;
+use zune_jpeg::zune_core::bytestream::ZCursor;
+use zune_jpeg::zune_core::colorspace::ColorSpace;
+use zune_jpeg::zune_core::options::DecoderOptions;
+
+use super::any_image::AnyImage;
+use super::codec::{Begins, Codec, Source};
+use super::colour::grey;
+use super::error::ReadReason;
+use super::format::ImageFormat;
+use super::note::LoadedImage;
+use super::shape::plausible_count;
+use super::stream;
+
+const FORMAT: ImageFormat = ImageFormat::named("JPEG");
+
+pub(super) const CODEC: Codec = Codec {
+    endings: &[".jpg", ".jpeg"],
+    begins: Begins::With(&[b"\xff\xd8\xff"]),
+    ..Codec::reading(FORMAT, read)
+};
+
+/// Samples that a byte of the file can stand for at most: a block of 64 samples takes at least a bit, and
+/// axes may be subsampled fourfold.
+const DENSITY: u64 = 8 * 64 * 4;
+
+/// Decodes a flat image, colour to luminance in place. The file is held whole meanwhile.
+fn read(mut source: Source) -> Result<LoadedImage, ReadReason> {
+    let mut file = Vec::new();
+    source.bytes.read_to_end(&mut file).map_err(ReadReason::Io)?;
+    let options = DecoderOptions::default()
+        .set_strict_mode(false)
+        .set_max_width(usize::MAX)
+        .set_max_height(usize::MAX);
+    let mut headers = JpegDecoder::new_with_options(ZCursor::new(&file[..]), options);
+    headers.decode_headers().map_err(|e| ReadReason::decoder(FORMAT, e))?;
+    let (width, height) = headers.dimensions().unwrap_or_default();
+    // of others the decoder makes RGB
+    let color = match headers.input_colorspace() {
+        Some(color @ (ColorSpace::Luma | ColorSpace::LumaA | ColorSpace::RGBA)) => color,
+        _ => ColorSpace::RGB,
+    };
+    let count = plausible_count(&[width, height], source.length, DENSITY)?;
+    let mut samples = stream::zeros(count.saturating_mul(color.num_components()))?;
+    let options = options.jpeg_set_out_colorspace(color);
+    let mut decoder = JpegDecoder::new_with_options(ZCursor::new(&file[..]), options);
+    decoder.decode_into(&mut samples).map_err(|e| ReadReason::decoder(FORMAT, e))?;
+    let samples = Samples::U8(grey(samples, color.num_components()));
+    Ok(AnyImage::frameless(&[width, height], samples)?.into())
+}
+
+#[cfg(test)]
+mod tests;

@@ -1,0 +1,155 @@
+//! PNG through the `png` crate: grey and colour of 1 to 16 bits.
+//!
+//! Samples of fewer than 8 bits are stretched to the whole range of 8; palettes are followed. Of an
+//! animation the first picture is read.
+
+use std::io::{BufReader, Read, Seek, SeekFrom};
+
+use ::png::{
+    BitDepth, ColorType, Compression, DecodingError, EncodingError, Filter, Transformations,
+};
+use atomesh::image::Samples;
+use atomesh::watch::Watch;
+
+use super::any_image::AnyImage;
+use super::codec::{Begins, Codec, Output, Source};
+use super::colour::grey;
+use super::error::{ReadReason, WriteReason};
+use super::format::ImageFormat;
+use super::note::LoadedImage;
+use super::shape::plausible_count;
+use super::stream;
+use super::view::ImageView;
+
+const FORMAT: ImageFormat = ImageFormat::named("PNG");
+
+pub(super) const CODEC: Codec = Codec {
+    endings: &[".png"],
+    begins: Begins::With(&[b"\x89PNG\r\n\x1a\n"]),
+    write: Some(write),
+    ..Codec::reading(FORMAT, read)
+};
+
+/// Samples that a byte of the file can stand for at most: deflate packs 1032 bytes into one, and a byte
+/// holds eight samples of one bit.
+const DENSITY: u64 = 8 * 1032;
+
+/// Memory that the decoder may take besides 8 bytes for each possible sample.
+const WORKING_MEMORY: u64 = 64 << 20;
+
+/// Decodes a flat image, colour to luminance in place.
+fn read(source: Source) -> Result<LoadedImage, ReadReason> {
+    let file_bytes = source.length;
+    let mut bytes = BufReader::new(source.bytes);
+    refuse_broken_palettes(&mut bytes)?;
+    let most = file_bytes.saturating_mul(8 * DENSITY).saturating_add(WORKING_MEMORY);
+    let limits = ::png::Limits { bytes: usize::try_from(most).unwrap_or(usize::MAX) };
+    let mut decoder = ::png::Decoder::new_with_limits(bytes, limits);
+    decoder.set_ignore_text_chunk(true);
+    decoder.set_transformations(Transformations::EXPAND);
+    let mut reader = decoder.read_info().map_err(reason)?;
+    let shape = [reader.info().width as usize, reader.info().height as usize];
+    let count = plausible_count(&shape, file_bytes, DENSITY)?;
+    let (color, depth) = reader.output_color_type();
+    let values = count.saturating_mul(color.samples());
+    let samples = match (color, depth) {
+        (ColorType::Indexed, _) | (_, BitDepth::One | BitDepth::Two | BitDepth::Four) => {
+            return Err(ReadReason::Unsupported {
+                format: FORMAT,
+                found: format!("{color:?} samples of {depth:?} bits"),
+                expected: "grey and colour of 8 and 16 bits",
+            });
+        }
+        (_, BitDepth::Eight) => {
+            let mut decoded: Vec<u8> = stream::zeros(values)?;
+            reader.next_frame(&mut decoded).map_err(reason)?;
+            Samples::U8(grey(decoded, color.samples()))
+        }
+        (_, BitDepth::Sixteen) => {
+            let mut decoded: Vec<u16> = stream::zeros(values)?;
+            reader.next_frame(bytemuck::cast_slice_mut(&mut decoded)).map_err(reason)?;
+            decoded.iter_mut().for_each(|value| *value = u16::from_be(*value));
+            Samples::U16(grey(decoded, color.samples()))
+        }
+    };
+    Ok(AnyImage::frameless(&shape, samples)?.into())
+}
+
+/// Looks at the chunks before the samples for a palette that is not made of whole colours, three
+/// bytes each, for the decoder (`png` 0.18.1) panics on one; then goes back to the start.
+fn refuse_broken_palettes<R: Read + Seek>(source: &mut BufReader<R>) -> Result<(), ReadReason> {
+    let mut at = 8; // behind the signature
+    loop {
+        source.seek(SeekFrom::Start(at)).map_err(ReadReason::Io)?;
+        let mut head = [0; 8];
+        let filled = stream::fill(source, &mut head)?;
+        let [a, b, c, d, kind @ ..] = head;
+        let length = u32::from_be_bytes([a, b, c, d]);
+        match &kind {
+            _ if filled < head.len() => break, // the decoder says what is missing
+            b"IDAT" | b"IEND" => break,
+            b"PLTE" if !length.is_multiple_of(3) => {
+                return Err(ReadReason::Header {
+                    format: FORMAT,
+                    field: "PLTE length",
+                    value: length.to_string(),
+                    expected: "a multiple of 3",
+                });
+            }
+            _ => at += 12 + u64::from(length), // length, kind, check sum
+        }
+    }
+    source.rewind().map_err(ReadReason::Io)
+}
+
+/// The reason that a decoder's error stands for.
+fn reason(error: DecodingError) -> ReadReason {
+    match error {
+        DecodingError::LimitsExceeded => {
+            ReadReason::decoder(FORMAT, "its parts unpack to more than its size allows")
+        }
+        other => ReadReason::decoder(FORMAT, other),
+    }
+}
+
+/// Writes a PNG of 8 or 16 bits, without the frame: PNG cannot hold one.
+fn write(out: &mut dyn Output, image: &ImageView, _: &mut dyn Watch) -> Result<(), WriteReason> {
+    let too_large = || WriteReason::Shape {
+        format: FORMAT,
+        shape: image.shape.clone(),
+        expected: "flat images up to 2^31 samples across; write .tif, .nii.gz or .npy instead",
+    };
+    let [width, height] = image.shape[..] else { return Err(too_large()) };
+    let side = |n: usize| i32::try_from(n).map(i32::cast_unsigned).map_err(|_| too_large());
+    let mut encoder = ::png::Encoder::new(out, side(width)?, side(height)?);
+    encoder.set_color(ColorType::Grayscale);
+    encoder.set_compression(Compression::Fast);
+    encoder.set_filter(Filter::Adaptive);
+    let wide: Vec<u16>;
+    let (depth, bytes) = match image.samples {
+        Samples::U8(values) => (BitDepth::Eight, &values[..]),
+        Samples::U16(values) => {
+            wide = values.iter().map(|value| value.to_be()).collect();
+            (BitDepth::Sixteen, bytemuck::cast_slice(&wide))
+        }
+        other => {
+            return Err(WriteReason::SampleType {
+                format: FORMAT,
+                sample_type: other.type_name(),
+                expected: "uint8 and uint16; write .tif, .nii.gz or .npy instead",
+            });
+        }
+    };
+    encoder.set_depth(depth);
+    let written = encoder.write_header().and_then(|mut writer| {
+        writer.write_image_data(bytes)?;
+        writer.finish()
+    });
+    written.map_err(|error| match error {
+        EncodingError::IoError(error) => WriteReason::Io(error),
+        other => WriteReason::Encoder { format: FORMAT, error: other.into() },
+    })
+}
+
+#[cfg(test)]
+mod tests;

@@ -1,0 +1,191 @@
+//! Writing Abaqus input files.
+
+use std::collections::HashMap;
+use std::io::Write;
+
+use atomesh::mesh::{Mesh, Tags};
+use atomesh::watch::{Phase, Watch, check};
+
+use super::super::data::MeshData;
+use super::super::error::MeshWriteError;
+use super::super::metadata;
+use super::super::tags::plain_name;
+use super::{CELLS, face_number};
+
+/// Bytes gathered before they are handed on.
+const CHUNK: usize = 1 << 18;
+
+/// Lines between two looks at the watch.
+const LINES_PER_STEP: usize = 1 << 18;
+
+/// The most letters of a line of comment; lines may have 256.
+const COMMENT: usize = 200;
+
+/// Abaqus' name for cells of so many points: triangles or tetrahedra, or those of second order, whose nodes it
+/// has in our order.
+fn element_type(node_count: usize) -> &'static str {
+    match node_count {
+        3 => "CPS3",
+        4 => "C3D4",
+        6 => "CPS6",
+        _ => "C3D10",
+    }
+}
+
+/// Writes a mesh as an Abaqus input file.
+///
+/// # Errors
+/// If `out` cannot be written to, or the watch ends the work.
+pub fn write_inp<const D: usize>(
+    out: &mut impl Write,
+    data: &MeshData<D>,
+    watch: &mut dyn Watch,
+) -> Result<(), MeshWriteError> {
+    let mesh = data.mesh();
+    let total = (data.nodes().len() + mesh.cell_count()).max(1) as f64;
+    let mut to = Lines { out, bytes: Vec::new(), watch, count: 0, total };
+    to.line(format_args!("*HEADING\natomesh"))?;
+    let json = data.metadata();
+    let letters: Vec<char> = json.chars().collect();
+    for part in letters.chunks(COMMENT) {
+        to.line(format_args!("**{} {}", metadata::NAME, part.iter().collect::<String>()))?;
+    }
+    to.line(format_args!("*NODE"))?;
+    for (i, p) in data.nodes().iter().enumerate() {
+        let z = p.get(2).copied().unwrap_or(0.0);
+        to.line(format_args!("{}, {:?}, {:?}, {z:?}", i + 1, p[0], p[1]))?;
+    }
+    let each = data.nodes_per_cell();
+    to.line(format_args!("*ELEMENT, TYPE={}, ELSET={CELLS}", element_type(each)))?;
+    for (i, cell) in data.cell_nodes().chunks_exact(each).enumerate() {
+        let nodes: Vec<String> = cell.iter().map(|node| (node + 1).to_string()).collect();
+        to.line(format_args!("{}, {}", i + 1, nodes.join(", ")))?;
+    }
+    if let Some(tags) = data.tags() {
+        regions(&mut to, tags)?;
+        facet_groups(&mut to, mesh, tags)?;
+    }
+    to.flush()
+}
+
+fn regions<W: Write, const D: usize>(
+    to: &mut Lines<W>,
+    tags: &Tags<D>,
+) -> Result<(), MeshWriteError> {
+    let Some(regions) = tags.regions() else { return Ok(()) };
+    let mut cells: HashMap<i32, Vec<usize>> = HashMap::new();
+    for (cell, &id) in regions.of_cells.iter().enumerate() {
+        cells.entry(id).or_default().push(cell + 1);
+    }
+    for id in regions.ids() {
+        let name = regions.name(id);
+        to.line(format_args!("**region {id} {name}"))?;
+        to.line(format_args!("*ELSET, ELSET={}", plain_name(&name)))?;
+        to.list(&cells[&id])?;
+    }
+    Ok(())
+}
+
+fn facet_groups<W: Write, const D: usize>(
+    to: &mut Lines<W>,
+    mesh: &Mesh<D>,
+    tags: &Tags<D>,
+) -> Result<(), MeshWriteError> {
+    let cells = mesh.cells_of_points();
+    for group in tags.facet_groups() {
+        let name = plain_name(&group.name);
+        let mut nodes: Vec<usize> =
+            group.facets.as_flattened().iter().map(|&corner| corner as usize + 1).collect();
+        nodes.sort_unstable();
+        nodes.dedup();
+        to.line(format_args!("**group {} {}", group.id, group.name))?;
+        to.line(format_args!("*NSET, NSET={name}"))?;
+        to.list(&nodes)?;
+        let mut faces = vec![Vec::new(); D + 2];
+        for facet in &group.facets {
+            if let Some(face) = face_behind(mesh, facet, mesh.cells_beside(facet, &cells)) {
+                faces[face.number].push(face.element);
+            }
+        }
+        let used = || faces.iter().enumerate().filter(|(_, cells)| !cells.is_empty());
+        for (number, cells) in used() {
+            to.line(format_args!("*ELSET, ELSET={name}_S{number}, INTERNAL"))?;
+            to.list(cells)?;
+        }
+        to.line(format_args!("*SURFACE, TYPE=ELEMENT, NAME={name}"))?;
+        for (number, _) in used() {
+            to.line(format_args!("{name}_S{number}, S{number}"))?;
+        }
+    }
+    Ok(())
+}
+
+/// A face of an element, both by their numbers.
+struct Face {
+    element: usize,
+    number: usize,
+}
+
+/// The face that a facet is, of the cell whose own facet there is turned alike; else of the first of the
+/// cells `beside` it.
+fn face_behind<const D: usize>(
+    mesh: &Mesh<D>,
+    facet: &[u32; D],
+    beside: impl Iterator<Item = u32>,
+) -> Option<Face> {
+    let mut first = None;
+    for cell in beside {
+        let corners = &mesh.corners()[cell as usize * (D + 1)..][..D + 1];
+        let opposite = corners.iter().position(|c| !facet.contains(c)).unwrap_or(0);
+        let face = Face { element: cell as usize + 1, number: face_number(D, opposite) };
+        if is_rotated(&mesh.facet_of(cell as usize, opposite), facet) {
+            return Some(face);
+        }
+        first = first.or(Some(face));
+    }
+    first
+}
+
+/// Whether the corners follow one another in the same order around.
+fn is_rotated<const D: usize>(a: &[u32; D], b: &[u32; D]) -> bool {
+    let shift = b.iter().position(|corner| *corner == a[0]).unwrap_or(0);
+    // an edge has its two ends in one order alone
+    if D == 2 { a == b } else { (0..D).all(|k| a[k] == b[(k + shift) % D]) }
+}
+
+/// Lines of text.
+struct Lines<'a, W> {
+    out: &'a mut W,
+    bytes: Vec<u8>,
+    watch: &'a mut dyn Watch,
+    count: usize,
+    /// About how many lines there will be.
+    total: f64,
+}
+
+impl<W: Write> Lines<'_, W> {
+    fn line(&mut self, text: std::fmt::Arguments) -> Result<(), MeshWriteError> {
+        self.bytes.write_fmt(text)?;
+        self.bytes.push(b'\n');
+        self.count += 1;
+        if self.count.is_multiple_of(LINES_PER_STEP) {
+            check(self.watch, Phase::Write, (self.count as f64 / self.total).min(1.0), None)?;
+        }
+        if self.bytes.len() >= CHUNK { self.flush() } else { Ok(()) }
+    }
+
+    /// Numbers, sixteen a line, as many as the format takes.
+    fn list(&mut self, numbers: &[usize]) -> Result<(), MeshWriteError> {
+        for some in numbers.chunks(16) {
+            let words: Vec<String> = some.iter().map(usize::to_string).collect();
+            self.line(format_args!("{}", words.join(", ")))?;
+        }
+        Ok(())
+    }
+
+    fn flush(&mut self) -> Result<(), MeshWriteError> {
+        self.out.write_all(&self.bytes)?;
+        self.bytes.clear();
+        Ok(())
+    }
+}
