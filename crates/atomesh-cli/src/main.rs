@@ -1,31 +1,22 @@
 //! The command `atomesh`: from an image to a mesh that follows it.
 //!
-//! Arguments in, text out: each command reads files, calls the core, and writes files that appear
-//! whole or not at all. Standard output carries what was asked for; progress, warnings, summaries and
-//! errors go to standard error. Exit codes: 0; 1 for content, memory or output; 2 for options; 130
+//! Arguments in, text out: each command takes its options from the command line, calls a job, and says what
+//! became of it. Standard output carries what was asked for; progress, notes, summaries and
+//! errors go to standard error. Exit codes: 0; 1 for content, files or memory; 2 for options; 130
 //! after Ctrl-C.
 
 mod commands;
-mod dimension;
-mod failure;
-mod frame_options;
-mod memory;
-mod mesh_file;
-mod meshing;
-mod outputs;
 mod progress;
-mod report_page;
-mod run_config;
-mod section;
-mod values;
+mod words;
 
 use std::io::Write;
 use std::process::ExitCode;
 
+use atomesh_job::JobError;
 use clap::{CommandFactory, Parser, Subcommand};
 
-use failure::Failure;
 use progress::{Progress, Verbosity, catch_interrupts};
+use words::{exit_code, refusal};
 
 /// Meshes aligned with images.
 #[derive(Debug, Parser)]
@@ -39,7 +30,7 @@ struct Cli {
     /// Print a line for every phase, with its time
     #[arg(short, long, global = true, help_heading = "Run")]
     verbose: bool,
-    /// Threads to use; the result is the same with any number. Default: one a core
+    /// Threads to use, 1 to 1024; the result is the same with any number. Default: one per core
     #[arg(long, global = true, value_name = "COUNT", help_heading = "Run",
         value_parser = clap::value_parser!(u16).range(1..=1024))]
     threads: Option<u16>,
@@ -70,7 +61,7 @@ impl Cli {
         }
     }
 
-    fn run(self) -> Result<String, Failure> {
+    fn run(self) -> Result<String, JobError> {
         let mut watch = Progress::new(self.verbosity());
         let result = match self.command {
             Command::Mesh(args) => commands::mesh::run(*args, &mut watch),
@@ -102,15 +93,15 @@ fn main() -> ExitCode {
     let _ = rayon::ThreadPoolBuilder::new().num_threads(threads).build_global();
     match std::panic::catch_unwind(|| cli.run()) {
         Ok(Ok(text)) => print(&text),
-        Ok(Err(failure)) => {
-            eprintln!("{failure}");
-            ExitCode::from(failure.code())
+        Ok(Err(error)) => {
+            eprintln!("{}", refusal(&error));
+            ExitCode::from(exit_code(&error))
         }
         Err(_) => ExitCode::FAILURE,
     }
 }
 
-/// Prints on standard output; a reader that goes away early is no error.
+/// Prints on standard output; a reader that goes away early is not an error.
 fn print(text: &str) -> ExitCode {
     let mut out = std::io::stdout().lock();
     match out.write_all(text.as_bytes()).and_then(|()| out.flush()) {
@@ -125,6 +116,8 @@ fn print(text: &str) -> ExitCode {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use atomesh_job::options::RunConfig;
+    use clap::Args;
 
     #[test]
     fn the_arguments_are_consistent() {
@@ -146,5 +139,34 @@ mod tests {
             }
         }
         assert!(names > 20, "{names}");
+    }
+
+    /// The defaults of a dimension by option.
+    fn defaults<const D: usize>() -> Vec<(String, String)> {
+        let run = RunConfig::default().with_defaults::<D>();
+        let tables = serde_json::to_value(run).unwrap();
+        let options = tables.as_object().unwrap().values().flat_map(|t| t.as_object().unwrap());
+        options
+            .map(|(name, value)| {
+                (name.clone(), value.as_str().map_or_else(|| value.to_string(), str::to_owned))
+            })
+            .collect()
+    }
+
+    #[test]
+    fn help_states_the_defaults_that_are_used() {
+        let command = RunConfig::augment_args(clap::Command::new("mesh"));
+        for (name, value) in [defaults::<2>(), defaults::<3>()].concat() {
+            let option = command.get_arguments().find(|a| a.get_long() == Some(&name));
+            let help = option.unwrap().get_help().unwrap().to_string();
+            let (_, stated) = help.split_once("Default: ").unwrap_or_else(|| panic!("{name}"));
+            let words: Vec<&str> = stated.split([' ', ',', ';']).collect();
+            let stated: Vec<f64> = stated.split([' ', ',', ';']).flat_map(str::parse).collect();
+            let same = match value.parse::<f64>() {
+                Ok(value) => stated.contains(&value),
+                Err(_) => words.contains(&value.as_str()),
+            };
+            assert!(same, "--{name} is {value}; help says: {help}");
+        }
     }
 }

@@ -1,4 +1,4 @@
-//! What the work is busy with: a bar on a terminal, times for the report, and Ctrl-C.
+//! What the work is busy with: a bar on a terminal, lines for phases and notes, and Ctrl-C.
 
 use std::io::IsTerminal;
 use std::ops::ControlFlow;
@@ -7,9 +7,10 @@ use std::sync::{Mutex, MutexGuard, PoisonError};
 use std::time::{Duration, Instant};
 
 use atomesh::watch::{Phase, Watch};
+use atomesh_job::{JobError, Listener, Note, Session};
 use indicatif::{ProgressBar, ProgressDrawTarget, ProgressStyle};
 
-use crate::failure::Failure;
+use crate::words::{exit_code, refusal};
 
 /// Whether Ctrl-C was pressed.
 static INTERRUPTED: AtomicBool = AtomicBool::new(false);
@@ -29,9 +30,9 @@ pub fn catch_interrupts() {
         std::thread::sleep(PATIENCE);
         let _files_are_whole = writing();
         let clear = if std::io::stderr().is_terminal() { "\r\x1b[2K" } else { "" };
-        let failure = Failure::cancelled();
-        eprintln!("{clear}{failure}");
-        std::process::exit(failure.code().into());
+        let error = JobError::cancelled();
+        eprintln!("{clear}{}", refusal(&error));
+        std::process::exit(exit_code(&error).into());
     };
     // without a handler the system ends the process, which is no worse than failing to start
     let _ = ctrlc::set_handler(end);
@@ -47,7 +48,7 @@ pub fn writing() -> MutexGuard<'static, ()> {
 pub enum Verbosity {
     /// Errors alone.
     Quiet,
-    /// A bar on a terminal, warnings, a summary.
+    /// A bar on a terminal, notes, a summary.
     #[default]
     Normal,
     /// A line a phase besides.
@@ -62,13 +63,12 @@ const STEPS: u64 = 1000;
 pub struct Progress {
     verbosity: Verbosity,
     bar: ProgressBar,
-    started: Instant,
     phase: Option<(Phase, Instant)>,
-    times: Vec<(Phase, Duration)>,
+    writing: Option<MutexGuard<'static, ()>>,
 }
 
 impl Progress {
-    /// Starts the clock. The bar shows if standard error is a terminal.
+    /// The bar shows if standard error is a terminal.
     pub fn new(verbosity: Verbosity) -> Self {
         let target = match verbosity {
             Verbosity::Quiet => ProgressDrawTarget::hidden(),
@@ -77,31 +77,44 @@ impl Progress {
         let bar = ProgressBar::with_draw_target(Some(STEPS), target);
         let style = ProgressStyle::with_template("{prefix:>10} [{bar:30}] {percent:>3} % {msg}");
         bar.set_style(style.expect("a valid template").progress_chars("=> "));
-        Self { verbosity, bar, started: Instant::now(), phase: None, times: Vec::new() }
+        Self { verbosity, bar, phase: None, writing: None }
     }
 
-    /// How much is said.
-    pub fn verbosity(&self) -> Verbosity {
-        self.verbosity
+    /// Whether nothing but errors is said.
+    pub fn is_quiet(&self) -> bool {
+        self.verbosity == Verbosity::Quiet
     }
 
-    /// Ends the phase under way, whose time is up to now.
+    /// Does a job and says what became of it, in the words that `words` finds.
+    ///
+    /// # Errors
+    /// The job's.
+    pub fn job<T>(
+        &mut self,
+        job: impl FnOnce(&mut Session<'_>) -> Result<T, JobError>,
+        words: impl FnOnce(&T, Duration) -> String,
+    ) -> Result<T, JobError> {
+        let mut session = Session::heard_by(self);
+        let done = job(&mut session)?;
+        let elapsed = session.elapsed();
+        self.finish();
+        let text = words(&done, elapsed);
+        text.lines().for_each(|line| self.say(line));
+        Ok(done)
+    }
+
+    /// Ends the phase under way.
     pub fn finish(&mut self) {
-        if let Some((phase, since)) = self.phase.take() {
-            let time = since.elapsed();
-            match self.times.iter_mut().find(|(p, _)| *p == phase) {
-                Some((_, sum)) => *sum += time,
-                None => self.times.push((phase, time)),
-            }
-            if self.verbosity == Verbosity::Verbose {
-                self.say(&format!("{:>10} {:8.3} s", phase.name(), time.as_secs_f64()));
-            }
+        if let Some((phase, since)) = self.phase.take()
+            && self.verbosity == Verbosity::Verbose
+        {
+            self.say(&format!("{:>10} {:8.3} s", phase.name(), since.elapsed().as_secs_f64()));
         }
         self.bar.finish_and_clear();
     }
 
     /// Begins a phase, ending the one under way.
-    pub fn begin(&mut self, phase: Phase) {
+    fn begin(&mut self, phase: Phase) {
         if self.phase.is_none_or(|(p, _)| p != phase) {
             self.finish();
             self.phase = Some((phase, Instant::now()));
@@ -112,25 +125,10 @@ impl Progress {
     }
 
     /// Prints a line on standard error, unless all is to be quiet.
-    pub fn say(&self, line: &str) {
-        if self.verbosity != Verbosity::Quiet {
+    fn say(&self, line: &str) {
+        if !self.is_quiet() {
             self.bar.suspend(|| eprintln!("{line}"));
         }
-    }
-
-    /// The time that each phase took, in the order in which they began.
-    pub fn times(&self) -> &[(Phase, Duration)] {
-        &self.times
-    }
-
-    /// The time since the start.
-    pub fn elapsed(&self) -> Duration {
-        self.started.elapsed()
-    }
-
-    /// Whether the user wants the work to end.
-    pub fn interrupted(&self) -> bool {
-        INTERRUPTED.load(Ordering::Relaxed)
     }
 }
 
@@ -143,22 +141,19 @@ impl Watch for Progress {
                 self.bar.set_message(format!("energy {energy:.6e}"));
             }
         }
-        if self.interrupted() { ControlFlow::Break(()) } else { ControlFlow::Continue(()) }
+        match INTERRUPTED.load(Ordering::Relaxed) {
+            true => ControlFlow::Break(()),
+            false => ControlFlow::Continue(()),
+        }
     }
 }
 
-#[cfg(test)]
-mod tests {
-    use super::*;
+impl Listener for Progress {
+    fn note(&mut self, note: &Note) {
+        self.say(&note.to_string());
+    }
 
-    #[test]
-    fn a_phase_that_comes_back_adds_to_its_time() {
-        let mut progress = Progress::new(Verbosity::Quiet);
-        for phase in [Phase::Read, Phase::Read, Phase::Grow, Phase::Read] {
-            assert_eq!(progress.step(phase, 0.5, None), ControlFlow::Continue(()));
-        }
-        progress.finish();
-        let phases: Vec<_> = progress.times().iter().map(|(phase, _)| *phase).collect();
-        assert_eq!(phases, [Phase::Read, Phase::Grow]);
+    fn writing(&mut self, begins: bool) {
+        self.writing = begins.then(writing);
     }
 }

@@ -4,9 +4,7 @@ use std::path::PathBuf;
 
 use atomesh::mesh::Mesh;
 use atomesh_io::mesh::AnyMesh;
-
-use crate::failure::Failure;
-use crate::mesh_file;
+use atomesh_job::{Dimension, JobError, mesh_file};
 
 /// Check that a mesh is valid
 ///
@@ -23,17 +21,18 @@ pub struct CheckArgs {
 /// Runs the command; the text is for standard output.
 ///
 /// # Errors
-/// [`Failure`] if the file is no mesh or the mesh breaks a promise.
-pub fn run(args: &CheckArgs) -> Result<String, Failure> {
+/// [`JobError`] if the file holds no mesh, or one that breaks a promise.
+pub fn run(args: &CheckArgs) -> Result<String, JobError> {
     let verdict = match &mesh_file::read(&args.mesh)? {
-        AnyMesh::Flat(loaded) => verdict(&loaded.mesh, "triangles"),
-        AnyMesh::Volume(loaded) => verdict(&loaded.mesh, "tetrahedra"),
+        AnyMesh::Flat(loaded) => verdict(&loaded.mesh, &Dimension::plane()),
+        AnyMesh::Volume(loaded) => verdict(&loaded.mesh, &Dimension::space()),
     };
     let verdict = verdict.map_err(|f| f.about(&args.mesh))?;
     Ok(format!("{}: {verdict}\n", args.mesh.display()))
 }
 
-fn verdict<const D: usize>(mesh: &Mesh<D>, cells: &str) -> Result<String, Failure> {
-    mesh.validate().map_err(Failure::content)?;
-    Ok(format!("valid, {} points, {} {cells}", mesh.points().len(), mesh.cell_count()))
+fn verdict<const D: usize>(mesh: &Mesh<D>, dimension: &Dimension<D>) -> Result<String, JobError> {
+    mesh.validate().map_err(JobError::content)?;
+    let (points, cells) = (mesh.points().len(), mesh.cell_count());
+    Ok(format!("valid, {points} points, {cells} {}", dimension.cells))
 }

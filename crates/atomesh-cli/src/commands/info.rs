@@ -1,18 +1,16 @@
 //! `atomesh info`: what an image or mesh file holds.
 
-use std::fmt::Write;
+use std::fmt::{Display, Write};
 use std::path::PathBuf;
 
 use atomesh::geometry::Bounds;
-use atomesh::image::Frame;
-use atomesh::measure::shape;
+use atomesh::image::{Frame, Units};
+use atomesh::measure::{ShapeReport, shape};
 use atomesh::watch::Watch;
 use atomesh_io::image::{AnyImage, LoadedImage};
-use atomesh_io::mesh::{AnyMesh, LoadedMesh, MeshFormat};
-
-use crate::failure::Failure;
-use crate::frame_options::{self, FrameOptions};
-use crate::mesh_file;
+use atomesh_io::mesh::{AnyMesh, LoadedMesh, MeshFormat, OwnedField};
+use atomesh_job::options::FrameOptions;
+use atomesh_job::{Dimension, JobError, images, mesh_file};
 
 /// Show what an image or mesh file holds
 ///
@@ -38,17 +36,17 @@ pub struct InfoArgs {
 /// Runs the command; the text is for standard output.
 ///
 /// # Errors
-/// [`Failure`] if the file cannot be read.
-pub fn run(args: &InfoArgs, watch: &mut dyn Watch) -> Result<String, Failure> {
+/// [`JobError`] if the file cannot be read.
+pub fn run(args: &InfoArgs, watch: &mut dyn Watch) -> Result<String, JobError> {
     let options = args.frame.read_options()?;
     if options.raw.is_none() && MeshFormat::of(&args.file).is_ok() {
         return match &mesh_file::read(&args.file)? {
-            AnyMesh::Flat(loaded) => mesh_text(loaded, "triangles", watch),
-            AnyMesh::Volume(loaded) => mesh_text(loaded, "tetrahedra", watch),
+            AnyMesh::Flat(loaded) => mesh_text(loaded, &Dimension::plane(), watch),
+            AnyMesh::Volume(loaded) => mesh_text(loaded, &Dimension::space(), watch),
         }
         .map_err(|f| f.about(&args.file));
     }
-    let LoadedImage { image, units, notes } = frame_options::load(&args.file, &options, watch)?;
+    let LoadedImage { image, units, notes } = images::load(&args.file, &options, watch)?;
     let mut text = String::new();
     let range = image.range();
     line(&mut text, "type", image.type_name());
@@ -72,7 +70,7 @@ pub fn run(args: &InfoArgs, watch: &mut dyn Watch) -> Result<String, Failure> {
 }
 
 /// A line of a name and a value.
-fn line(text: &mut String, name: &str, value: impl std::fmt::Display) {
+fn line(text: &mut String, name: &str, value: impl Display) {
     // writing to a string cannot fail
     let _ = writeln!(text, "{name:<10} {value}");
 }
@@ -88,7 +86,7 @@ fn listed(names: impl Iterator<Item = String>, count: usize) -> String {
 }
 
 /// Numbers as options take them.
-fn list<T: std::fmt::Display>(numbers: &[T]) -> String {
+fn list<T: Display>(numbers: &[T]) -> String {
     numbers.iter().map(T::to_string).collect::<Vec<_>>().join(",")
 }
 
@@ -106,7 +104,7 @@ fn frame_text<const D: usize>(frame: &Frame<D>) -> String {
     let last = frame.shape().map(|n| (n - 1) as f64);
     let corners = (0..1 << D).map(|corner| -> [f64; D] {
         let at = |k: usize| if corner >> k & 1 == 0 { 0.0 } else { last[k] };
-        frame.lattice_to_world(atomesh::image::Units::Samples, &std::array::from_fn(at))
+        frame.lattice_to_world(Units::Samples, &std::array::from_fn(at))
     });
     let (mut min, mut max) = ([f64::INFINITY; D], [f64::NEG_INFINITY; D]);
     for p in corners {
@@ -120,50 +118,22 @@ fn frame_text<const D: usize>(frame: &Frame<D>) -> String {
 
 fn mesh_text<const D: usize>(
     loaded: &LoadedMesh<D>,
-    cells: &str,
+    dimension: &Dimension<D>,
     watch: &mut dyn Watch,
-) -> Result<String, Failure> {
+) -> Result<String, JobError> {
     let mesh = &loaded.mesh;
     let mut text = String::new();
     line(&mut text, "points", mesh.points().len());
-    line(&mut text, cells, mesh.cell_count());
+    line(&mut text, dimension.cells, mesh.cell_count());
     if loaded.skipped_cells > 0 {
         line(&mut text, "left out", format_args!("{} other cells", loaded.skipped_cells));
     }
     if let Some(Bounds { min, max }) = Bounds::of(mesh.points()) {
         line(&mut text, "box", box_text(min, max));
     }
-    let report = shape(mesh, None, watch).map_err(super::measure_failure)?;
-    let (mean, first, least) = (report.q_mean, report.q_p1, report.q_min);
-    line(
-        &mut text,
-        "quality",
-        format_args!("mean {mean:.4}, first percentile {first:.4}, least {least:.4}"),
-    );
-    line(
-        &mut text,
-        "angle",
-        format_args!("least {:.2}°, first percentile {:.2}°", report.angle_min, report.angle_p1),
-    );
-    line(&mut text, "edge", format_args!("mean {:.4}", report.edge_mean));
-    if report.inverted + report.flat > 0 {
-        let odd = format!("{} inverted, {} flat", report.inverted, report.flat);
-        line(&mut text, "odd cells", odd);
-    }
-    for field in &loaded.point_fields {
-        let finite = || field.values.iter().copied().filter(|v| v.is_finite());
-        let (least, greatest) =
-            (finite().fold(f32::INFINITY, f32::min), finite().fold(f32::NEG_INFINITY, f32::max));
-        let value = format!("{}, {least} to {greatest}", field.name);
-        line(&mut text, "field", value);
-    }
-    for field in &loaded.cell_fields {
-        let finite = || field.values.iter().copied().filter(|v| v.is_finite());
-        let (least, greatest) =
-            (finite().fold(f64::INFINITY, f64::min), finite().fold(f64::NEG_INFINITY, f64::max));
-        let value = format!("{}, {least} to {greatest}", field.name);
-        line(&mut text, "cell field", value);
-    }
+    quality_text(&mut text, &shape(mesh, None, watch)?);
+    loaded.point_fields.iter().for_each(|field| field_text(&mut text, "field", field));
+    loaded.cell_fields.iter().for_each(|field| field_text(&mut text, "cell field", field));
     let groups = loaded.tags.facet_groups();
     if !groups.is_empty() {
         let named = groups.iter().map(|group| format!("{} {}", group.name, group.facets.len()));
@@ -182,4 +152,36 @@ fn mesh_text<const D: usize>(
         line(&mut text, "options", &provenance.options);
     }
     Ok(text)
+}
+
+fn quality_text(text: &mut String, report: &ShapeReport) {
+    let (mean, first, least) = (report.q_mean, report.q_p1, report.q_min);
+    let quality = format!("mean {mean:.4}, first percentile {first:.4}, least {least:.4}");
+    line(text, "quality", quality);
+    let (least, first) = (report.angle_min, report.angle_p1);
+    line(text, "angle", format_args!("least {least:.2}°, first percentile {first:.2}°"));
+    line(text, "edge", format_args!("mean {:.4}", report.edge_mean));
+    if report.inverted + report.flat > 0 {
+        let odd = format!("{} inverted, {} flat", report.inverted, report.flat);
+        line(text, "odd cells", odd);
+    }
+}
+
+/// The name of a field and the range of its finite values.
+fn field_text<T>(text: &mut String, kind: &str, field: &OwnedField<T>)
+where
+    T: Copy + PartialOrd + Display + Into<f64>,
+{
+    let finite = field.values.iter().copied().filter(|&value| value.into().is_finite());
+    let range = finite.fold(None, |range: Option<(T, T)>, value| {
+        let (least, greatest) = range.unwrap_or((value, value));
+        let least = if value < least { value } else { least };
+        Some((least, if value > greatest { value } else { greatest }))
+    });
+    match range {
+        Some((least, greatest)) => {
+            line(text, kind, format_args!("{}, {least} to {greatest}", field.name));
+        }
+        None => line(text, kind, format_args!("{}, no finite value", field.name)),
+    }
 }

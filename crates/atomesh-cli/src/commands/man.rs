@@ -2,7 +2,8 @@
 
 use std::path::PathBuf;
 
-use crate::failure::Failure;
+use atomesh_job::JobError;
+
 use crate::progress::writing;
 
 /// Print the manual page, or write one for every command
@@ -19,17 +20,17 @@ pub struct ManArgs {
 /// Runs the command; the text is for standard output.
 ///
 /// # Errors
-/// [`Failure`] if a page cannot be written.
-pub fn run(args: &ManArgs, mut command: clap::Command) -> Result<String, Failure> {
+/// [`JobError`] if a page cannot be written.
+pub fn run(args: &ManArgs, mut command: clap::Command) -> Result<String, JobError> {
     let Some(folder) = &args.output else {
         let mut page = Vec::new();
-        clap_mangen::Man::new(command).render(&mut page).map_err(Failure::content)?;
+        clap_mangen::Man::new(command).render(&mut page).map_err(JobError::content)?;
         return Ok(String::from_utf8_lossy(&page).into_owned());
     };
     let _guard = writing();
     // a page for `help` would say what `--help` says
     command = command.disable_help_subcommand(true);
     clap_mangen::generate_to(command, folder)
-        .map_err(|e| Failure::content(format!("cannot be written: {e}")).about(folder))?;
+        .map_err(|e| JobError::file(format!("cannot be written: {e}")).about(folder))?;
     Ok(String::new())
 }

@@ -1,24 +1,18 @@
 //! `atomesh mesh`: from an image to a mesh that follows it.
 
-use std::path::{Path, PathBuf};
+use std::fmt::Write;
+use std::path::PathBuf;
+use std::time::Duration;
 
-use atomesh::image::Image;
 use atomesh::improve::ImproveReport;
-use atomesh::measure::{AlignmentReport, ShapeReport, shape};
+use atomesh::measure::ShapeReport;
 use atomesh::mesh::PolyReport;
-use atomesh::run::{MeshReport, Outcome, Prepared, RunError, VoronoiReport};
-use atomesh_io::image::AnyImage;
-use serde_json::json;
+use atomesh_job::mesh::{Expectation, MeshFileOptions, MeshSummary, expect, mesh_file};
+use atomesh_job::options::RunConfig;
+use atomesh_job::{JobError, memory};
 
-use crate::dimension::Dimension;
-use crate::failure::Failure;
-use crate::frame_options;
-use crate::memory;
-use crate::meshing::{Meshing, labels_alone, shown_path};
-use crate::outputs::{Outputs, write_bytes};
-use crate::progress::{Progress, Verbosity, writing};
-use crate::report_page::{PageParts, option_rows, write_page};
-use crate::run_config::RunConfig;
+use crate::progress::Progress;
+use crate::words::seconds;
 
 /// Turn an image into a mesh that follows it
 ///
@@ -33,13 +27,13 @@ use crate::run_config::RunConfig;
 pub struct MeshArgs {
     #[command(flatten)]
     run: RunConfig,
-    /// Take options from a file that --write-config wrote; the command line goes before it
+    /// Take options from a file that --write-config wrote; the command line takes precedence
     #[arg(long, value_name = "TOML", help_heading = "Run")]
     config: Option<PathBuf>,
     /// Write all options, defaults too, to a file for --config
     #[arg(long, value_name = "TOML", help_heading = "Run")]
     write_config: Option<PathBuf>,
-    /// Say how many atoms, and how much memory and time the mesh would take; write nothing
+    /// Print how many atoms, and how much memory and time the mesh would take; write nothing
     #[arg(long, help_heading = "Run")]
     dry_run: bool,
 }
@@ -73,297 +67,69 @@ Examples:
 /// Runs the command; the text is for standard output.
 ///
 /// # Errors
-/// [`Failure`] if options make no sense, a file cannot be used, or the user ends the work.
-pub fn run(args: MeshArgs, watch: &mut Progress) -> Result<String, Failure> {
+/// [`JobError`] if options make no sense, a file cannot be used, or the user ends the work.
+pub fn run(args: MeshArgs, progress: &mut Progress) -> Result<String, JobError> {
     let mut run = args.run;
     if let Some(path) = &args.config {
         run = run.or_file(path)?;
     }
-    labels_alone(&mut run);
-    run.check()?;
-    let shown = shown_path(&run)?.to_path_buf();
-    let outputs = if args.dry_run { None } else { Some(Outputs::new(&run, &shown)?) };
-    if let Some(outputs) = &outputs {
-        let _guard = writing();
-        outputs.check(&run.input, args.write_config.as_deref())?;
+    if args.dry_run {
+        let expected = progress.job(|session| expect(run, session), |_, _| String::new())?;
+        return Ok(expectation(&expected));
     }
-    let image = frame_options::read(&shown, &run.frame.read_options()?, watch)?;
-    let job = Job { run: &run, path: &shown, outputs, write_config: args.write_config.as_deref() };
-    match image {
-        AnyImage::Flat(image) => job.run(image, &Dimension::flat(), watch),
-        AnyImage::Volume(image) => job.run(image, &Dimension::volume(), watch),
-    }
+    let write_config = args.write_config.as_deref();
+    let options = MeshFileOptions { write_config, measures_shape: !progress.is_quiet() };
+    progress.job(|session| mesh_file(run, &options, session), summary)?;
+    Ok(String::new())
 }
 
-/// A run whose options are known.
-struct Job<'a> {
-    run: &'a RunConfig,
-    path: &'a Path,
-    /// `None`: say what the run would take.
-    outputs: Option<Outputs>,
-    write_config: Option<&'a Path>,
+fn summary(made: &MeshSummary, time: Duration) -> String {
+    let path = made.mesh.display();
+    let mut text = String::new();
+    if let Some(tagged) = &made.tagged {
+        let (features, facets) = (tagged.features, tagged.facets);
+        let _ = writeln!(text, "{path}: {features} features of {facets} facets tagged");
+    }
+    let figures = &made.figures;
+    let figures = if let Some(shape) = &figures.voronoi {
+        let recall = figures.voronoi_alignment.as_ref().and_then(|a| a.recall);
+        voronoi_figures(shape, recall, made.cells)
+    } else if let Some(shape) = &figures.shape {
+        simplex_figures(shape, made.improved.as_ref(), made.cells)
+    } else {
+        return text;
+    };
+    text + &format!("{path}: {figures}; {}", seconds(time))
 }
 
-impl Job<'_> {
-    fn meshing(&self) -> Meshing<'_> {
-        Meshing { run: self.run, path: self.path }
-    }
-
-    fn run<const D: usize>(
-        &self,
-        image: Image<D>,
-        dimension: &Dimension<D>,
-        watch: &mut Progress,
-    ) -> Result<String, Failure> {
-        let keep_image = self.outputs.as_ref().is_some_and(Outputs::needs_image);
-        let meshing = self.meshing();
-        let (prepared, image) = meshing.prepare(image, dimension, keep_image, watch)?;
-        let Some(outputs) = &self.outputs else {
-            return Ok(expectation(&prepared, dimension, self.run.is_voronoi()));
-        };
-        let outcome = prepared.run(watch).map_err(|e| meshing.failure(e))?;
-        let measured = image.as_ref().filter(|_| outputs.needs_report());
-        let figures = self.measure(&outcome, measured, watch)?;
-        let _guard = writing();
-        let options = self.run.provenance::<D>();
-        outputs.write(&outcome, image.as_ref(), options, dimension, watch)?;
-        if let Some(path) = self.write_config {
-            write_bytes(path, self.run.clone().with_defaults::<D>().to_toml()?.as_bytes())?;
-        }
-        watch.finish();
-        if let Some(path) = &outputs.report {
-            let text = format!("{:#}\n", self.report(&outcome, &figures, watch));
-            write_bytes(path, text.as_bytes())?;
-        }
-        if let (Some(path), Some(image)) = (&outputs.html, &image) {
-            self.write_page(path, (&outcome, image), &figures, dimension, watch)?;
-        }
-        if let Some(shape) = &figures.cells {
-            let recall = figures.cells_alignment.as_ref().and_then(|a| a.recall);
-            watch.say(&cells_summary(&outputs.mesh, (shape, recall), dimension, watch));
-        } else if let Some(shape) = &figures.shape {
-            let (mesh, improved) = (&outputs.mesh, outcome.improve_report());
-            watch.say(&summary(mesh, shape, improved, dimension, watch));
-        }
-        Ok(String::new())
-    }
-
-    fn measure<const D: usize>(
-        &self,
-        outcome: &Outcome<D>,
-        image: Option<&Image<D>>,
-        watch: &mut Progress,
-    ) -> Result<Figures, Failure> {
-        let is_quiet = watch.verbosity() == Verbosity::Quiet;
-        if let Some(cells) = outcome.cells() {
-            let mut figures = Figures::default();
-            if image.is_some() {
-                let report = outcome.cells_report(watch).map_err(|e| self.meshing().failure(e))?;
-                (figures.cells, figures.cells_alignment) =
-                    report.map(|VoronoiReport { shape, alignment, .. }| (shape, alignment)).unzip();
-            } else if !is_quiet {
-                let bounds = outcome.potential().grid().bounds();
-                figures.cells = Some(PolyReport::new(cells, &bounds));
-            }
-            return Ok(figures);
-        }
-        if let Some(image) = image {
-            let mut report = outcome.report(watch).map_err(|e| self.meshing().failure(e))?;
-            let fidelity = outcome.fidelity(image.samples(), watch);
-            report.fidelity = Some(fidelity.map_err(|e| self.meshing().failure(e))?);
-            let shape = Some(report.shape.clone());
-            return Ok(Figures { shape, report: Some(report), ..Figures::default() });
-        }
-        if is_quiet {
-            return Ok(Figures::default());
-        }
-        let shape = shape(outcome.mesh(), outcome.bounds().as_ref(), watch);
-        let shape = shape.map_err(|e| self.meshing().failure(RunError::Measure(e)))?;
-        Ok(Figures { shape: Some(shape), ..Figures::default() })
-    }
-
-    /// The report as JSON: the mesh's figures, then the run's.
-    fn report<const D: usize>(
-        &self,
-        outcome: &Outcome<D>,
-        figures: &Figures,
-        watch: &Progress,
-    ) -> serde_json::Value {
-        let frame = outcome.frame();
-        let seconds: serde_json::Map<_, _> = (watch.times().iter())
-            .map(|(phase, time)| (phase.name().to_owned(), json!(time.as_secs_f64())))
-            .collect();
-        let warnings: Vec<_> = outcome.warnings().iter().map(ToString::to_string).collect();
-        let distance = outcome.distance();
-        json!({
-            "version": env!("CARGO_PKG_VERSION"),
-            "image": {
-                "shape": frame.shape().as_slice(),
-                "spacing": frame.spacing().as_slice(),
-                "origin": frame.origin().as_slice(),
-            },
-            "distance": {
-                "least": distance.least(),
-                "mean": distance.mean(),
-                "greatest": distance.greatest(),
-            },
-            "shape": figures.shape_json(),
-            "alignment": figures.alignment_json(),
-            "spread": figures.report.as_ref().map(|r| &r.spread),
-            "fidelity": figures.report.as_ref().map(|r| &r.fidelity),
-            "optimizer": outcome.optimize_report(),
-            "improve": outcome.improve_report(),
-            "mirror": outcome.mirror_report(),
-            "seconds": seconds,
-            "seconds_total": watch.elapsed().as_secs_f64(),
-            "memory_peak_bytes": memory::peak(),
-            "threads": rayon::current_num_threads(),
-            "warnings": warnings,
-            "options": self.run.clone().with_defaults::<D>(),
-        })
-    }
-
-    /// The report as a page, with the mesh drawn over its image.
-    fn write_page<const D: usize>(
-        &self,
-        path: &Path,
-        (outcome, image): (&Outcome<D>, &Image<D>),
-        figures: &Figures,
-        dimension: &Dimension<D>,
-        watch: &Progress,
-    ) -> Result<(), Failure> {
-        let (Some(report), Some(outputs)) = (&figures.report, &self.outputs) else {
-            return Ok(());
-        };
-        let time = |seconds: f64| format!("{seconds:.3} s");
-        let times = watch.times().iter();
-        let mut run: Vec<_> =
-            times.map(|(phase, t)| (phase.name().to_owned(), time(t.as_secs_f64()))).collect();
-        run.push(("in all".into(), time(watch.elapsed().as_secs_f64())));
-        if let Some(bytes) = memory::peak() {
-            run.push(("memory, at most".into(), memory::text(bytes)));
-        }
-        let options = serde_json::to_value(self.run.clone().with_defaults::<D>());
-        let shape = outcome.frame().shape().map(|n| n.to_string()).join(" × ");
-        let parts = PageParts {
-            mesh: &outputs.mesh,
-            subtitle: format!(
-                "{} over an image of {shape} samples; atomesh {}",
-                dimension.cells,
-                env!("CARGO_PKG_VERSION")
-            ),
-            caption: caption::<D>(self.path),
-            tables: vec![
-                ("Options".into(), option_rows(&options.unwrap_or_default())),
-                ("Run".into(), run),
-            ],
-            warnings: outcome.warnings().iter().map(ToString::to_string).collect(),
-        };
-        let (mesh, style) = (outcome.sample_mesh(), outputs.style(outcome));
-        write_page(path, parts, report, (image, &mesh, &style), dimension)
-    }
-}
-
-/// What was measured.
-#[derive(Default)]
-struct Figures {
-    shape: Option<ShapeReport>,
-    report: Option<MeshReport>,
-    cells: Option<PolyReport>,
-    cells_alignment: Option<AlignmentReport>,
-}
-
-impl Figures {
-    /// The shape of what the mesh is made of.
-    fn shape_json(&self) -> serde_json::Value {
-        match &self.cells {
-            Some(shape) => json!(shape),
-            None => json!(self.report.as_ref().map(|r| &r.shape)),
-        }
-    }
-
-    fn alignment_json(&self) -> serde_json::Value {
-        match &self.cells_alignment {
-            Some(alignment) => json!(alignment),
-            None => json!(self.report.as_ref().map(|r| &r.alignment)),
-        }
-    }
-}
-
-fn cells_summary<const D: usize>(
-    path: &Path,
-    (shape, recall): (&PolyReport, Option<f64>),
-    dimension: &Dimension<D>,
-    watch: &Progress,
-) -> String {
-    let name = dimension.voronoi_cells;
+fn voronoi_figures(shape: &PolyReport, recall: Option<f64>, cells: &str) -> String {
     let followed = match recall {
         Some(recall) => format!("; {:.0} % of features followed", 100.0 * recall),
         None => String::new(),
     };
     format!(
-        "{}: {} {name}, {} faces; {:.1} faces a cell; volume error {:.1e}{followed}; {:.2} s",
-        path.display(),
-        shape.cells,
-        shape.faces,
-        shape.faces_per_cell_mean,
-        shape.volume_error,
-        watch.elapsed().as_secs_f64(),
+        "{} {cells}, {} faces; {:.1} faces a cell; volume error {:.1e}{followed}",
+        shape.cells, shape.faces, shape.faces_per_cell_mean, shape.volume_error,
     )
 }
 
-/// What the picture of a mesh over its image shows.
-pub fn caption<const D: usize>(image: &Path) -> String {
-    let name = image.file_name().unwrap_or(image.as_os_str()).to_string_lossy();
-    match D {
-        2 => format!("The mesh over {name}"),
-        _ => format!("The mesh over {name}, on the three slices through its middle"),
-    }
-}
-
-fn summary<const D: usize>(
-    path: &Path,
-    shape: &ShapeReport,
-    improved: Option<&ImproveReport>,
-    dimension: &Dimension<D>,
-    watch: &Progress,
-) -> String {
+fn simplex_figures(shape: &ShapeReport, improved: Option<&ImproveReport>, cells: &str) -> String {
     let below = improved.filter(|report| !report.floor_held).map_or_else(String::new, |report| {
-        format!(" ({} {} below --min-angle)", report.below, dimension.cells)
+        format!(" ({} {cells} below --min-angle)", report.below)
     });
     format!(
-        "{}: {} points, {} {}; quality mean {:.3}, least {:.3}; least angle {:.1}°{below}; {:.2} s",
-        path.display(),
-        shape.points,
-        shape.cells,
-        dimension.cells,
-        shape.q_mean,
-        shape.q_min,
-        shape.angle_min,
-        watch.elapsed().as_secs_f64(),
+        "{} points, {} {cells}; quality mean {:.3}, least {:.3}; least angle {:.1}°{below}",
+        shape.points, shape.cells, shape.q_mean, shape.q_min, shape.angle_min,
     )
 }
 
-/// Seconds that an atom takes from growth to mesh, for the dimension; a guide, from our own runs.
-const SECONDS_PER_ATOM: [f64; 2] = [5e-5, 1.2e-5];
-
-fn expectation<const D: usize>(
-    prepared: &Prepared<D>,
-    dimension: &Dimension<D>,
-    is_voronoi: bool,
-) -> String {
-    let estimate = prepared.estimate();
-    let (cells, name) = match is_voronoi {
-        true => (estimate.atoms, dimension.voronoi_cells),
-        false => (estimate.cells, dimension.cells),
-    };
-    let seconds = estimate.atoms as f64 * SECONDS_PER_ATOM[D - 2];
+fn expectation(expected: &Expectation) -> String {
     format!(
         "atoms  about {}\ncells  about {} {}\nmemory about {} beside the image\ntime   about {:.1} s\n",
-        estimate.atoms,
-        cells,
-        name,
-        memory::text(estimate.memory),
-        seconds.max(0.1),
+        expected.estimate.atoms,
+        expected.cell_count,
+        expected.cells,
+        memory::text(expected.estimate.memory),
+        expected.seconds,
     )
 }

@@ -5,14 +5,13 @@ use std::path::{Path, PathBuf};
 use atomesh::synth::{Scene, SynthError, SynthOptions, synthesize};
 use atomesh::watch::{Phase, Watch};
 use atomesh_io::image::{ImageFormat, WriteReason, write_image};
+use atomesh_job::files::{check, unknown_extension, write_bytes};
+use atomesh_job::options::axes;
+use atomesh_job::values::{Counts, Numbers};
+use atomesh_job::{JobError, Session, memory};
 use clap::builder::{PossibleValuesParser, TypedValueParser};
 
-use crate::failure::Failure;
-use crate::frame_options::axes;
-use crate::memory;
-use crate::outputs::{check_writable, write_bytes};
-use crate::progress::{Progress, writing};
-use crate::values::{Counts, Numbers};
+use crate::progress::Progress;
 
 /// Make a test image whose features are known
 ///
@@ -43,13 +42,13 @@ pub struct SynthArgs {
     /// Seed of the geometry and the noise
     #[arg(long, value_name = "SEED", default_value_t = 0)]
     seed: u64,
-    /// Standard deviation of Gaussian noise, over the contrast of the image
+    /// Standard deviation of Gaussian noise, relative to the contrast of the image, 0 to 100
     #[arg(long, value_name = "SHARE", default_value_t = 0.0)]
     noise: f64,
-    /// Standard deviation in samples of a Gaussian blur
+    /// Standard deviation of a Gaussian blur, in samples
     #[arg(long, value_name = "SIGMA", default_value_t = 0.0)]
     blur: f64,
-    /// Samples as unsigned bytes, as always in .png; else float32
+    /// Write samples as unsigned bytes, as .png always does, instead of float32
     #[arg(long)]
     bytes: bool,
 }
@@ -61,31 +60,68 @@ fn scene() -> impl TypedValueParser<Value = Scene> {
 /// Runs the command; the text is for standard output.
 ///
 /// # Errors
-/// [`Failure`] if an option is out of its range or a file cannot be written.
-pub fn run(args: &SynthArgs, watch: &mut Progress) -> Result<String, Failure> {
+/// [`JobError`] if an option is out of its range or a file cannot be written.
+pub fn run(args: &SynthArgs, progress: &mut Progress) -> Result<String, JobError> {
     let format = ImageFormat::from_path(&args.output).filter(|format| format.is_written());
     if format.is_none() {
         let known = ImageFormat::usual_written_endings(", ", false);
-        let message = format!("the ending says no format that is written; expected one of {known}");
-        return Err(Failure::misuse(message).about(&args.output));
+        return Err(unknown_extension(&args.output, &known));
     }
     let bytes = args.bytes || format == Some(ImageFormat::PNG);
-    match args.scene.dimension() {
-        2 => draw::<2>(args, 256, bytes, watch),
-        _ => draw::<3>(args, 96, bytes, watch),
-    }
+    let drawn = |session: &mut Session<'_>| match args.scene.dimension() {
+        2 => draw::<2>(args, 256, bytes, session),
+        _ => draw::<3>(args, 96, bytes, session),
+    };
+    progress.job(drawn, |summary, _| summary.clone())?;
+    Ok(String::new())
 }
 
+/// Draws the scene and writes it; in words.
 fn draw<const D: usize>(
     args: &SynthArgs,
     side: usize,
     bytes: bool,
-    watch: &mut Progress,
-) -> Result<String, Failure> {
+    session: &mut Session<'_>,
+) -> Result<String, JobError> {
+    let options = options::<D>(args, side, bytes)?;
+    check_memory(&options)?;
+    let truth_path = truth_path(&args.output);
+    check([args.output.as_path(), truth_path.as_path()], session)?;
+    let _ = session.step(Phase::Draw, 0.0, None);
+    let drawn = synthesize(args.scene, &options).map_err(|e| match e {
+        SynthError::Memory { .. } => JobError::memory(e),
+        _ => JobError::misuse(e),
+    })?;
+    let truth = serde_json::to_string_pretty(&drawn.truth).map_err(JobError::content)? + "\n";
+    if session.step(Phase::Write, 0.0, None).is_break() {
+        return Err(JobError::cancelled());
+    }
+    session.writing(|session| {
+        write_image(&args.output, &drawn.image, session).map_err(|e| match e.reason {
+            WriteReason::Shape { .. } => JobError::misuse(e),
+            _ => e.into(),
+        })?;
+        write_bytes(&truth_path, truth.as_bytes())
+    })?;
+    Ok(format!(
+        "{}: {:?} samples of {}; features in {}: {}",
+        args.output.display(),
+        drawn.image.frame().shape(),
+        drawn.image.samples().type_name(),
+        truth_path.display(),
+        drawn.truth.features.len(),
+    ))
+}
+
+fn options<const D: usize>(
+    args: &SynthArgs,
+    side: usize,
+    bytes: bool,
+) -> Result<SynthOptions<D>, JobError> {
     let shape = match &args.shape {
         Some(Counts(shape)) => shape.as_slice().try_into().map_err(|_| {
             let (scene, found) = (args.scene, shape.len());
-            Failure::misuse(format!("--shape has {found} axes; {scene} has {D}"))
+            JobError::misuse(format!("--shape has {found} axes; {scene} has {D}"))
         })?,
         None => [side; D],
     };
@@ -97,53 +133,28 @@ fn draw<const D: usize>(
     options.noise = args.noise;
     options.blur = args.blur;
     options.bytes = bytes;
-    let samples = shape.iter().fold(1u64, |n, &s| n.saturating_mul(s as u64));
+    Ok(options)
+}
+
+/// Refuses an image that does not fit into memory.
+fn check_memory<const D: usize>(options: &SynthOptions<D>) -> Result<(), JobError> {
+    let samples = options.shape.iter().fold(1u64, |n, &s| n.saturating_mul(s as u64));
     // bytes are drawn at once unless they are blurred, in single precision
-    let each = match (bytes, args.blur > 0.0) {
+    let each = match (options.bytes, options.blur > 0.0) {
         (true, false) => 1,
         (true, true) => 5,
         (false, _) => 4,
     };
     let needed = samples.saturating_mul(each);
-    if memory::available().is_some_and(|available| needed > available) {
-        let needed = memory::text(needed);
-        let message = format!("the image needs {needed} of memory, more than there is");
-        return Err(Failure::content(message).advise("choose a smaller --shape"));
+    if memory::available().is_none_or(|available| needed <= available) {
+        return Ok(());
     }
-    let truth_path = truth_path(&args.output);
-    {
-        let _guard = writing();
-        check_writable(&args.output)?;
-        check_writable(&truth_path)?;
-    }
-    watch.begin(Phase::Draw);
-    let drawn = synthesize(args.scene, &options).map_err(|e| match e {
-        SynthError::Memory { .. } => Failure::content(e),
-        _ => Failure::misuse(e),
-    })?;
-    let truth = serde_json::to_string_pretty(&drawn.truth).map_err(Failure::content)?;
-    if watch.step(Phase::Write, 0.0, None).is_break() {
-        return Err(Failure::cancelled());
-    }
-    let _guard = writing();
-    write_image(&args.output, &drawn.image, watch).map_err(|e| match e.reason {
-        WriteReason::Cancelled(_) => Failure::cancelled(),
-        WriteReason::Shape { .. } => Failure::misuse(e),
-        _ => Failure::content(e),
-    })?;
-    write_bytes(&truth_path, (truth + "\n").as_bytes())?;
-    let count = drawn.truth.features.len();
-    watch.say(&format!(
-        "{}: {:?} samples of {}; features in {}: {count}",
-        args.output.display(),
-        drawn.image.frame().shape(),
-        drawn.image.samples().type_name(),
-        truth_path.display(),
-    ));
-    Ok(String::new())
+    let needed = memory::text(needed);
+    let message = format!("the image needs {needed} of memory, more than there is");
+    Err(JobError::memory(message).advise("choose a smaller --shape"))
 }
 
-/// The image's name with another ending.
+/// The image's name with another extension.
 fn truth_path(image: &Path) -> PathBuf {
     let compressed = image.extension().is_some_and(|e| e.eq_ignore_ascii_case("gz"));
     let image = if compressed { image.with_extension("") } else { image.to_path_buf() };

@@ -1,0 +1,307 @@
+//! Voronoi cells for other simulators: read back as they were written, and right by MODFLOW's own formulas.
+
+use std::path::Path;
+
+use atomesh::features::FeatureFaces;
+use atomesh::geometry::Point;
+use atomesh::image::{Frame, Units};
+use atomesh::mesh::{Delaunay, PolyMesh, connections};
+use atomesh::voronoi::voronoi;
+use atomesh::watch::Silent;
+use atomesh_io::atomic_file::AtomicFile;
+use atomesh_io::mesh::Provenance;
+use atomesh_io::mesh::cells::write_cells_vtu;
+use atomesh_io::mesh::cells::{
+    AnyCells, CellData, CellReadError, ConnectionFiles, Flow, LoadedCells, ModflowFiles, Rock,
+    read_cells, write_connections, write_connections_with_flow, write_modflow,
+};
+
+/// A frame that turns, mirrors and stretches, with sites all over its box, sides included.
+fn flat() -> (Frame<2>, PolyMesh<2>) {
+    let frame = Frame::new([9, 7]).unwrap().with_spacing([2.0, 2.0]).unwrap();
+    let frame = frame.with_origin([10.0, -3.0]).unwrap();
+    let frame = frame.with_direction([[0.6, 0.8], [0.8, -0.6]]).unwrap();
+    (frame, world(&frame, &Delaunay::<2>::new(), 40))
+}
+
+fn volume() -> (Frame<3>, PolyMesh<3>) {
+    let frame = Frame::new([5, 4, 6]).unwrap().with_spacing([1.0, 2.0, 0.5]).unwrap();
+    let turned = [[0.0, -1.0, 0.0], [1.0, 0.0, 0.0], [0.0, 0.0, 1.0]];
+    let frame = frame.with_direction(turned).unwrap();
+    (frame, world(&frame, &Delaunay::<3>::new(), 60))
+}
+
+fn world<const D: usize>(frame: &Frame<D>, delaunay: &Delaunay<D>, count: usize) -> PolyMesh<D> {
+    let bounds = frame.grid(Units::Physical).bounds();
+    let steps = [0.754_877, 0.569_84, 0.819_17];
+    let place = |n: usize| -> Point<D> {
+        let share = |k: usize| (1.2 * (n as f64 * steps[k]).fract() - 0.1).clamp(0.0, 1.0);
+        std::array::from_fn(|k| bounds.min[k] + share(k) * (bounds.max[k] - bounds.min[k]))
+    };
+    let mut sites: Vec<Point<D>> = (0..count).map(place).collect();
+    sites.sort_by(atomesh::geometry::lexicographic);
+    sites.dedup();
+    let cells = voronoi(delaunay, &sites, bounds, &mut Silent).unwrap();
+    cells.moved(frame.is_mirrored(), |p| frame.lattice_to_world(Units::Physical, p))
+}
+
+/// The first and third face lie on feature 1, the second on feature 2.
+fn features<const D: usize>(mesh: &PolyMesh<D>) -> FeatureFaces {
+    let mut of_faces = vec![0; mesh.face_count()];
+    of_faces[..3].copy_from_slice(&[1, 2, 1]);
+    FeatureFaces { of_faces, strengths: Vec::new(), areas: vec![2.0, 1.0] }
+}
+
+fn with_data<const D: usize>(
+    frame: &Frame<D>,
+    mesh: &PolyMesh<D>,
+    use_it: impl FnOnce(&CellData<D>),
+) {
+    let options = serde_json::json!({ "lattice": { "units": "physical" } });
+    let provenance = Provenance { version: "0".into(), options, seed: 7 };
+    let features = features(mesh);
+    use_it(&CellData { mesh, features: &features, frame, provenance: &provenance });
+}
+
+fn write_vtu<const D: usize>(path: &Path, data: &CellData<D>) {
+    let mut file = AtomicFile::create(path).unwrap();
+    write_cells_vtu(&mut file, data, &mut Silent).unwrap();
+    file.commit().unwrap();
+}
+
+fn read_flat(path: &Path) -> LoadedCells<2> {
+    match read_cells(path, &mut Silent).unwrap() {
+        AnyCells::Flat(cells) => cells,
+        AnyCells::Volume(_) => panic!("polyhedra"),
+    }
+}
+
+fn read_volume(path: &Path) -> LoadedCells<3> {
+    match read_cells(path, &mut Silent).unwrap() {
+        AnyCells::Volume(cells) => cells,
+        AnyCells::Flat(_) => panic!("polygons"),
+    }
+}
+
+fn same<const D: usize>(read: &LoadedCells<D>, mesh: &PolyMesh<D>) {
+    assert_eq!(read.mesh.owners(), mesh.owners());
+    assert_eq!(read.mesh.neighbours(), mesh.neighbours());
+    for (a, b) in read.mesh.points().iter().zip(mesh.points()) {
+        let away = atomesh::geometry::distance_squared(a, b).sqrt();
+        assert!(away < 1e-9, "{a:?}, expected {b:?}");
+    }
+}
+
+#[test]
+fn cells_are_read_back_as_they_were_written() {
+    let folder = tempfile::tempdir().unwrap();
+    let (vtu, list) = (folder.path().join("cells.vtu"), folder.path().join("cells.json"));
+    let (frame, mesh) = flat();
+    with_data(&frame, &mesh, |data| {
+        write_vtu(&vtu, data);
+        write_connections(&ConnectionFiles::of(&list), data, &mut Silent).unwrap();
+    });
+    same(&read_flat(&vtu), &mesh);
+    same(&read_flat(&list), &mesh);
+    assert_eq!(read_flat(&list).features.of_faces, features(&mesh).of_faces);
+    assert_eq!(read_flat(&list).frame, frame);
+    assert!(read_flat(&vtu).features.areas.is_empty(), "the VTU file does not name them");
+    let (frame, mesh) = volume();
+    with_data(&frame, &mesh, |data| {
+        write_vtu(&vtu, data);
+        write_connections(&ConnectionFiles::of(&list), data, &mut Silent).unwrap();
+    });
+    same(&read_volume(&vtu), &mesh);
+    same(&read_volume(&list), &mesh);
+}
+
+#[test]
+fn a_list_with_flow_keeps_its_permeability_as_a_field() {
+    let folder = tempfile::tempdir().unwrap();
+    let list = folder.path().join("flow.json");
+    let (frame, mesh) = volume();
+    let k: Vec<f64> = (0..mesh.cell_count()).map(|cell| 1.0 + cell as f64).collect();
+    let t: Vec<f64> = connections(&mesh).iter().map(|c| c.geometry()).collect();
+    let flow = Flow { permeability: &k, transmissibilities: &t };
+    let files = ConnectionFiles::of(&list);
+    with_data(&frame, &mesh, |data| {
+        write_connections_with_flow(&files, data, flow, &mut Silent).unwrap();
+    });
+    let read = read_volume(&list);
+    assert_eq!((read.fields[0].name.as_str(), &read.fields[0].values), ("permeability", &k));
+    let table = std::fs::read_to_string(&files.connections).unwrap();
+    let column = table.lines().skip(1).map(|line| line.rsplit(',').next().unwrap());
+    let found: Vec<f64> = column.map(|text| text.parse().unwrap()).collect();
+    assert_eq!(found, t);
+    let sides = std::fs::read_to_string(&files.boundary).unwrap();
+    let on_side = |line: &&str| line.split(',').nth(3) == Some("0.0");
+    assert!(sides.lines().filter(on_side).all(|line| line.ends_with(',')));
+    assert!(sides.lines().any(|line| on_side(&line)), "some sites lie on sides");
+}
+
+#[test]
+fn files_that_hold_no_such_cells_are_refused() {
+    let folder = tempfile::tempdir().unwrap();
+    let list = folder.path().join("cells.json");
+    let (frame, mesh) = flat();
+    let files = ConnectionFiles::of(&list);
+    with_data(&frame, &mesh, |data| write_connections(&files, data, &mut Silent).unwrap());
+    let whole = std::fs::read_to_string(&files.cells).unwrap();
+    let fails = |text: &str| {
+        std::fs::write(&files.cells, text).unwrap();
+        read_cells(&list, &mut Silent).unwrap_err()
+    };
+    // the site of the first cell a little away
+    let row = whole.lines().nth(1).unwrap();
+    let x = row.split(',').nth(1).unwrap();
+    let moved = row.replacen(x, &format!("{:?}", x.parse::<f64>().unwrap() + 0.01), 1);
+    let error = fails(&whole.replacen(row, &moved, 1));
+    assert!(
+        matches!(error, CellReadError::OtherCell { .. } | CellReadError::Voronoi(_)),
+        "{error}"
+    );
+    let error = fails(&whole.replacen("site_x", "place_x", 1));
+    assert!(error.to_string().contains("site_x"), "{error}");
+    let error = fails(&whole.replacen(x, "east", 1));
+    assert!(error.to_string().contains("line 2") && error.to_string().contains("east"), "{error}");
+    std::fs::write(&list, "{}").unwrap();
+    assert!(
+        read_cells(&list, &mut Silent).unwrap_err().to_string().contains("list of connections")
+    );
+}
+
+/// The rows of a block.
+fn block<'a>(text: &'a str, name: &str) -> Vec<Vec<&'a str>> {
+    let rest = text.split_once(&format!("BEGIN {name}\n")).expect("the block is there").1;
+    let lines = rest.split_once("END ").unwrap().0.lines();
+    lines.map(|line| line.split_whitespace().collect()).collect()
+}
+
+/// The numbers of an array of so many.
+fn array(text: &str, name: &str, count: usize) -> Vec<f64> {
+    let rest = text.split_once(&format!("\n  {name}\n")).expect("the array is there").1;
+    let mut words = rest.split_whitespace();
+    if words.next() == Some("CONSTANT") {
+        return vec![words.next().unwrap().parse().unwrap(); count];
+    }
+    words.skip(2).take(count).map(|word| word.parse().unwrap()).collect()
+}
+
+fn written<const D: usize>(
+    frame: &Frame<D>,
+    mesh: &PolyMesh<D>,
+    rock: &Rock,
+    name: &str,
+) -> [String; 3] {
+    let folder = tempfile::tempdir().unwrap();
+    let files = ModflowFiles::of(&folder.path().join(name), true);
+    with_data(frame, mesh, |data| write_modflow(&files, data, rock, &mut Silent).unwrap());
+    let paths = files.paths();
+    std::array::from_fn(|n| std::fs::read_to_string(paths[n]).unwrap())
+}
+
+#[test]
+fn a_layer_of_polygons_has_the_areas_of_the_cells_and_runs_clockwise() {
+    let (frame, mesh) = flat();
+    let k: Vec<f64> = (0..mesh.cell_count()).map(|cell| 0.5 + cell as f64).collect();
+    let mut multipliers = vec![1.0; mesh.inner_face_count()];
+    multipliers[..2].copy_from_slice(&[0.0, 0.25]);
+    let rock = Rock { permeability: &k, multipliers: &multipliers, top: 5.0, thickness: 2.0 };
+    let [disv, npf, hfb] = written(&frame, &mesh, &rock, "layer.disv");
+    let points: Vec<[f64; 2]> = block(&disv, "VERTICES")
+        .iter()
+        .map(|row| [row[1].parse().unwrap(), row[2].parse().unwrap()])
+        .collect();
+    for (row, (area, site)) in
+        block(&disv, "CELL2D").iter().zip(mesh.measures().iter().zip(mesh.centers()))
+    {
+        assert_eq!([row[1].parse::<f64>().unwrap(), row[2].parse().unwrap()], *site);
+        let at = |n: usize| points[row[4 + n % (row.len() - 4)].parse::<usize>().unwrap() - 1];
+        let count = row[3].parse::<usize>().unwrap();
+        assert_eq!(count, row.len() - 4);
+        let twice: f64 =
+            (0..count).map(|n| at(n)[0] * at(n + 1)[1] - at(n)[1] * at(n + 1)[0]).sum();
+        assert!((twice + 2.0 * area).abs() < 1e-10 * area, "clockwise: below 0");
+    }
+    assert_eq!(array(&disv, "TOP", 1), [5.0]);
+    assert_eq!(array(&disv, "BOTM", 1), [3.0]);
+    assert_eq!(array(&npf, "K", k.len()), k);
+    let rows = block(&hfb, "PERIOD 1");
+    let [a, b] = connections(&mesh)[1].cells.map(|cell| (cell + 1).to_string());
+    assert_eq!(rows.len(), 2);
+    assert_eq!(rows[0][4], "0.0", "sealed");
+    assert_eq!(rows[1], ["1", &a, "1", &b, "-0.25"], "below 0: a multiplier");
+}
+
+#[test]
+fn polyhedra_have_the_volumes_and_conductances_of_the_cells() {
+    // cubic samples: the cells of a stretched frame would not stand at right angles
+    let frame = Frame::new([5, 4, 6]).unwrap();
+    let mesh = world(&frame, &Delaunay::<3>::new(), 60);
+    let count = mesh.cell_count();
+    let k: Vec<f64> = (0..count).map(|cell| 0.5 + cell as f64).collect();
+    let multipliers = vec![1.0; mesh.inner_face_count()];
+    let rock = Rock { permeability: &k, multipliers: &multipliers, top: 0.0, thickness: 1.0 };
+    let [disu, npf, _] = written(&frame, &mesh, &rock, "cells.disu");
+    let faces = connections(&mesh);
+    let nja = count + 2 * faces.len();
+    assert_eq!(
+        block(&disu, "DIMENSIONS"),
+        [["NODES", &count.to_string()], ["NJA", &nja.to_string()]]
+    );
+    let of_cells = |name: &str| array(&disu, name, count);
+    for cell in 0..count {
+        let height = of_cells("TOP")[cell] - of_cells("BOT")[cell];
+        let volume = of_cells("AREA")[cell] * height;
+        assert!((volume / mesh.measures()[cell] - 1.0).abs() < 1e-12);
+    }
+    let of_pairs = |name: &str| array(&disu, name, nja);
+    let (iac, ja, cl, width) =
+        (of_cells("IAC"), of_pairs("JA"), of_pairs("CL12"), of_pairs("HWVA"));
+    assert!(of_pairs("IHC").iter().all(|flag| *flag == 1.0));
+    let permeability = array(&npf, "K", count);
+    let mut starts = vec![0];
+    iac.iter().for_each(|n| starts.push(starts.last().unwrap() + *n as usize));
+    let entry = |cell: usize, other: usize| {
+        let own = starts[cell] + 1..starts[cell + 1];
+        own.clone().find(|&at| ja[at] as usize == other + 1).expect("a neighbour")
+    };
+    for cell in 0..count {
+        assert_eq!(ja[starts[cell]] as usize, cell + 1, "its own number first");
+    }
+    for face in &faces {
+        let [a, b] = face.cells.map(|cell| cell as usize);
+        let (there, back) = (entry(a, b), entry(b, a));
+        assert_eq!(width[there], width[back], "symmetric");
+        // the harmonic mean of confined cells of height 1 (MODFLOW 6, NPF, equation 4-6)
+        let conductance = width[there] * permeability[a] * permeability[b]
+            / (permeability[a] * cl[back] + permeability[b] * cl[there]);
+        let expected = face.area / (face.distances[0] / k[a] + face.distances[1] / k[b]);
+        assert!((conductance / expected - 1.0).abs() < 1e-12);
+    }
+}
+
+#[test]
+fn two_squares_are_written_as_these_lines() {
+    let frame = Frame::new([5, 3]).unwrap();
+    let bounds = frame.grid(Units::Physical).bounds();
+    let middle = |k: usize, share: f64| bounds.min[k] + share * (bounds.max[k] - bounds.min[k]);
+    let sites = [0.25, 0.75].map(|share| [middle(0, share), middle(1, 0.5)]);
+    let mesh = voronoi(&Delaunay::<2>::new(), &sites, bounds, &mut Silent).unwrap();
+    let rock = Rock { permeability: &[2.0, 3.0], multipliers: &[0.5], top: 0.0, thickness: 10.0 };
+    let [disv, npf, hfb] = written_without_features(&frame, &mesh, &rock);
+    assert_eq!(disv, include_str!("../data/two-squares.disv"));
+    assert_eq!(npf, include_str!("../data/two-squares.npf"));
+    assert_eq!(hfb, include_str!("../data/two-squares.hfb"));
+}
+
+fn written_without_features(frame: &Frame<2>, mesh: &PolyMesh<2>, rock: &Rock) -> [String; 3] {
+    let folder = tempfile::tempdir().unwrap();
+    let files = ModflowFiles::of(&folder.path().join("two-squares.disv"), true);
+    let provenance = Provenance { version: "0".into(), options: serde_json::json!({}), seed: 7 };
+    let features = FeatureFaces::default();
+    let data = CellData { mesh, features: &features, frame, provenance: &provenance };
+    write_modflow(&files, &data, rock, &mut Silent).unwrap();
+    let paths = files.paths();
+    std::array::from_fn(|n| std::fs::read_to_string(paths[n]).unwrap())
+}

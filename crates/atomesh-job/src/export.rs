@@ -1,0 +1,202 @@
+//! Voronoi cells for other flow simulators.
+
+use std::path::{Path, PathBuf};
+
+use atomesh_flow::{FlowError, FlowMethod, Problem};
+use atomesh_io::mesh::cells::{
+    AnyCells, CellData, CellReadError, ConnectionFiles, Flow, LoadedCells, ModflowFiles, Rock,
+    read_cells, write_connections_with_flow, write_modflow,
+};
+
+use crate::error::JobError;
+use crate::files::{self, unknown_extension};
+use crate::permeability;
+use crate::session::Session;
+use crate::values::BarrierSpec;
+#[cfg(feature = "clap")]
+use crate::values::number_in;
+
+/// Voronoi cells, what flows through them, and where they go.
+#[derive(Clone, Debug, PartialEq)]
+#[cfg_attr(feature = "clap", derive(clap::Args))]
+pub struct ExportRequest {
+    /// Voronoi cells that atomesh wrote: .vtu, or .json (a list of connections, which also names features)
+    #[cfg_attr(feature = "clap", arg(value_name = "CELLS"))]
+    pub cells: PathBuf,
+    /// File to write: .json (connections), .disv (MODFLOW 6, polygons), .disu (MODFLOW 6, polyhedra)
+    #[cfg_attr(feature = "clap", arg(short, long, value_name = "FILE"))]
+    pub output: PathBuf,
+    /// Permeability: a number above 0, or the name of a field of the cells
+    #[cfg_attr(feature = "clap", arg(long, value_name = "VALUE|NAME", default_value_t = Self::default().permeability))]
+    pub permeability: String,
+    /// Share of the flow that a feature lets through, 0 (sealed) to 1 (open). May be given many times
+    #[cfg_attr(feature = "clap", arg(long, value_name = "NAME=M"))]
+    pub barrier: Vec<BarrierSpec>,
+    /// Thickness of the layer of polygons (.disv)
+    #[cfg_attr(feature = "clap", arg(long, value_name = "LENGTH", default_value_t = Self::default().thickness,
+        value_parser = number_in(f64::MIN_POSITIVE, f64::MAX, "a number above 0")))]
+    pub thickness: f64,
+    /// Height of the layer's top (.disv)
+    #[cfg_attr(feature = "clap", arg(long, value_name = "HEIGHT", default_value_t = Self::default().top,
+        allow_hyphen_values = true, value_parser = number_in(f64::MIN, f64::MAX, "a finite number")))]
+    pub top: f64,
+}
+
+impl Default for ExportRequest {
+    fn default() -> Self {
+        Self {
+            cells: PathBuf::new(),
+            output: PathBuf::new(),
+            permeability: "1".into(),
+            barrier: Vec::new(),
+            thickness: 1.0,
+            top: 0.0,
+        }
+    }
+}
+
+/// What became of [`export_file`].
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct ExportSummary {
+    /// How many cells.
+    pub cell_count: usize,
+    /// How many faces between two cells.
+    pub connections: usize,
+    /// How many of them let nothing through.
+    pub sealed: usize,
+    /// The least transmissibility of the others.
+    pub least: f64,
+    /// The greatest.
+    pub greatest: f64,
+}
+
+/// What is written.
+enum ExportFormat {
+    Connections(ConnectionFiles),
+    Disv(ModflowFiles),
+    Disu(ModflowFiles),
+}
+
+impl ExportFormat {
+    fn of(request: &ExportRequest) -> Result<Self, JobError> {
+        let path = request.output.as_path();
+        let modflow = || ModflowFiles::of(path, !request.barrier.is_empty());
+        let extension = path.extension().unwrap_or_default().to_ascii_lowercase();
+        match extension.to_str() {
+            Some("json") => Ok(Self::Connections(ConnectionFiles::of(path))),
+            Some("disv") => Ok(Self::Disv(modflow())),
+            Some("disu") => Ok(Self::Disu(modflow())),
+            _ => Err(unknown_extension(path, ".json (connections), .disv, .disu (MODFLOW 6)")),
+        }
+    }
+
+    fn paths(&self) -> Vec<&Path> {
+        match self {
+            Self::Connections(files) => files.paths().to_vec(),
+            Self::Disv(files) | Self::Disu(files) => files.paths(),
+        }
+    }
+}
+
+/// Reads Voronoi cells and writes them for other simulators.
+///
+/// # Errors
+/// [`JobError`] if a file cannot be used, options make no sense, or the watch ends the work.
+pub fn export_file(
+    request: &ExportRequest,
+    session: &mut Session<'_>,
+) -> Result<ExportSummary, JobError> {
+    let format = ExportFormat::of(request)?;
+    files::check_apart([request.cells.as_path()], format.paths(), session)?;
+    let read = read_cells(&request.cells, session).map_err(|e| refusal(e, &request.cells))?;
+    match (read, &format) {
+        (AnyCells::Flat(_), ExportFormat::Disu(_)) => {
+            let message = "holds polygons; expected a file to write that ends in .disv";
+            Err(JobError::misuse(message).about(&request.cells))
+        }
+        (AnyCells::Volume(_), ExportFormat::Disv(_)) => {
+            let message = "holds polyhedra; expected a file to write that ends in .disu";
+            Err(JobError::misuse(message).about(&request.cells))
+        }
+        (AnyCells::Flat(cells), _) => {
+            Export { request, format: &format, cells: &cells }.write(&FlowMethod::plane(), session)
+        }
+        (AnyCells::Volume(cells), _) => {
+            Export { request, format: &format, cells: &cells }.write(&FlowMethod::space(), session)
+        }
+    }
+}
+
+fn refusal(error: CellReadError, path: &Path) -> JobError {
+    match error {
+        CellReadError::Cancelled(_) => JobError::cancelled(),
+        CellReadError::Format => JobError::misuse(error),
+        CellReadError::Io { error, .. } => JobError::file(format!("cannot be read: {error}")),
+        CellReadError::Mesh(_) | CellReadError::NotVoronoi { .. } => JobError::content(error)
+            .advise("`atomesh mesh IMAGE -o CELLS.vtu --mesh voronoi` makes Voronoi cells"),
+        _ => JobError::content(error),
+    }
+    .about(path)
+}
+
+/// Cells that are exported.
+struct Export<'a, const D: usize> {
+    request: &'a ExportRequest,
+    format: &'a ExportFormat,
+    cells: &'a LoadedCells<D>,
+}
+
+impl<const D: usize> Export<'_, D> {
+    fn write(
+        &self,
+        method: &FlowMethod<D>,
+        session: &mut Session<'_>,
+    ) -> Result<ExportSummary, JobError> {
+        let LoadedCells { mesh, features, fields, frame, provenance } = self.cells;
+        let grid = (method.grid_of_cells)(mesh, Some(features));
+        let barriers = self.request.barrier.iter().map(|spec| spec.barrier().clone()).collect();
+        let permeability = permeability::given(&self.request.permeability, fields)?;
+        let problem = Problem { permeability, barriers, ..Problem::default() };
+        let about = |e: FlowError| flow_refusal(e, &self.request.cells);
+        let setting = (method.setting)(&problem, &grid).map_err(about)?;
+        let multipliers = setting.multipliers();
+        let found = (method.transmissibilities)(mesh, setting.permeability(), multipliers);
+        let found = found.map_err(about)?;
+        let k: Vec<f64> = (0..mesh.cell_count())
+            .map(|cell| problem.permeability.scalar(cell).expect("it is no tensor"))
+            .collect();
+        let data = CellData { mesh, features, frame, provenance };
+        let written = session.writing(|session| match self.format {
+            ExportFormat::Connections(files) => {
+                let flow = Flow { permeability: &k, transmissibilities: &found };
+                write_connections_with_flow(files, &data, flow, session)
+            }
+            ExportFormat::Disv(files) | ExportFormat::Disu(files) => {
+                let (top, thickness) = (self.request.top, self.request.thickness);
+                let rock = Rock { permeability: &k, multipliers, top, thickness };
+                write_modflow(files, &data, &rock, session)
+            }
+        });
+        written.map_err(|e| JobError::from(e).about(&self.request.output))?;
+        let open = found.iter().copied().filter(|t| *t > 0.0);
+        let (least, greatest) =
+            open.fold((f64::INFINITY, 0.0_f64), |(l, m), t| (l.min(t), m.max(t)));
+        Ok(ExportSummary {
+            cell_count: mesh.cell_count(),
+            connections: mesh.inner_face_count(),
+            sealed: multipliers.iter().filter(|multiplier| **multiplier == 0.0).count(),
+            least,
+            greatest,
+        })
+    }
+}
+
+fn flow_refusal(error: FlowError, cells: &Path) -> JobError {
+    let is_group = matches!(error, FlowError::Group { .. });
+    let refusal = JobError::from(error).about(cells);
+    if is_group {
+        return refusal
+            .advise("features are named in a list of connections (.json), not in a .vtu file");
+    }
+    refusal
+}

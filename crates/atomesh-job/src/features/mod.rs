@@ -1,0 +1,236 @@
+//! The facets of a mesh that follow an image, as surfaces and as tags.
+
+mod write;
+
+use std::path::{Path, PathBuf};
+
+use atomesh::enhance::{FeatureOptions, enhance, given_potential};
+use atomesh::features::{
+    FacetField, FacetTest, FeatureFacetOptions, FeatureSet, Selection, find_features,
+};
+use atomesh::fields::ScalarField;
+use atomesh::image::{Image, Units};
+use atomesh::run::{MeshOptions, lattice_mesh};
+use atomesh_io::mesh::{AnyMesh, LoadedMesh};
+
+use crate::dimension::Dimension;
+use crate::error::JobError;
+use crate::images::{Beside, ImageRole};
+use crate::mesh_file;
+use crate::options::{FrameOptions, PotentialOptions, RunConfig};
+use crate::session::Session;
+#[cfg(feature = "clap")]
+use crate::values::{named, number_in};
+use write::FeatureFiles;
+
+/// A mesh, the image whose features its facets follow, and where they go.
+#[derive(Clone, Debug, PartialEq)]
+#[cfg_attr(feature = "clap", derive(clap::Args))]
+pub struct FeaturesRequest {
+    /// Mesh, in world coordinates: .vtu .vtk .msh .msh2 .npz .inp
+    #[cfg_attr(feature = "clap", arg(value_name = "MESH"))]
+    pub mesh: PathBuf,
+    /// Image whose features the facets follow. Its frame is that of the options below, else of the
+    /// mesh if atomesh wrote it, else of this file
+    #[cfg_attr(feature = "clap", arg(value_name = "IMAGE", conflicts_with = "potential"))]
+    pub image: Option<PathBuf>,
+    /// Potential b(x), an image with values from -1 (features) to 1
+    #[cfg_attr(feature = "clap", arg(long, value_name = "FILE"))]
+    pub potential: Option<PathBuf>,
+    /// Surfaces to write: .vtp .obj .ply; in 3-D also .stl and .ts (GOCAD), in 2-D .pl (GOCAD)
+    #[cfg_attr(feature = "clap", arg(short, long, value_name = "SURFACE"))]
+    pub output: Option<PathBuf>,
+    /// Mesh to write with the features and the sides of the box as tagged facets: .vtu .msh .msh2 .inp, or
+    /// a folder named polyMesh
+    #[cfg_attr(feature = "clap", arg(long, value_name = "MESH"))]
+    pub mesh_output: Option<PathBuf>,
+    /// Write the parts into which the features cut the mesh as its regions of cells, 1, 2 ..., in place of those
+    /// that it has
+    #[cfg_attr(feature = "clap", arg(long, requires = "mesh_output"))]
+    pub regions: bool,
+    /// With --regions, parts of fewer cells go to their neighbours
+    #[cfg_attr(
+        feature = "clap",
+        arg(long, value_name = "COUNT", default_value_t = 0, requires = "regions")
+    )]
+    pub least_island: usize,
+    /// File for the features in numbers (length or area, mean of b, box), as JSON
+    #[cfg_attr(feature = "clap", arg(long, value_name = "JSON"))]
+    pub json: Option<PathBuf>,
+    /// Facets are chosen whose value of b is at most this, -1 to 1
+    #[cfg_attr(feature = "clap", arg(long, value_name = "B", default_value_t = Self::default().below,
+        value_parser = number_in(-1.0, 1.0, "a number from -1 to 1")))]
+    pub below: f64,
+    /// Value of b along a facet that counts: its mean, or its greatest
+    #[cfg_attr(feature = "clap", arg(long, value_name = "VALUE", default_value = "mean",
+        value_parser = named::<FacetTest>(&["mean", "max"])))]
+    pub test: FacetTest,
+    /// Pieces of fewer facets are dropped
+    #[cfg_attr(feature = "clap", arg(long, value_name = "COUNT", default_value_t = Self::default().min_facets))]
+    pub min_facets: usize,
+    /// Pieces of less length (2-D) or area (3-D), in world units, are dropped
+    #[cfg_attr(feature = "clap", arg(long, value_name = "MEASURE", default_value_t = Self::default().min_measure,
+        value_parser = number_in(0.0, f64::MAX, "a number of 0 or more")))]
+    pub min_measure: f64,
+    /// Add facets where two ends or borders are one facet apart and the turn is at most 60°
+    #[cfg_attr(feature = "clap", arg(long))]
+    pub close_gaps: bool,
+    /// Lattice units in which the potential is made. Default: those in which the mesh was made, else
+    /// physical
+    #[cfg_attr(feature = "clap", arg(long, value_name = "UNITS",
+        value_parser = named::<Units>(&["physical", "samples"])))]
+    pub units: Option<Units>,
+    /// Features.
+    #[cfg_attr(feature = "clap", command(flatten, next_help_heading = "Features"))]
+    pub features: PotentialOptions,
+    /// Frame.
+    #[cfg_attr(feature = "clap", command(flatten, next_help_heading = "Frame"))]
+    pub frame: FrameOptions,
+}
+
+impl Default for FeaturesRequest {
+    fn default() -> Self {
+        let FeatureFacetOptions { below, test, min_facets, min_measure, close_gaps } =
+            FeatureFacetOptions::default();
+        Self {
+            mesh: PathBuf::new(),
+            image: None,
+            potential: None,
+            output: None,
+            mesh_output: None,
+            regions: false,
+            least_island: 0,
+            json: None,
+            below,
+            test,
+            min_facets,
+            min_measure,
+            close_gaps,
+            units: None,
+            features: PotentialOptions::default(),
+            frame: FrameOptions::default(),
+        }
+    }
+}
+
+impl FeaturesRequest {
+    /// The image or potential along which b is read.
+    fn source(&self) -> Option<&Path> {
+        self.image.as_deref().or(self.potential.as_deref())
+    }
+
+    fn facet_options(&self) -> FeatureFacetOptions {
+        FeatureFacetOptions {
+            below: self.below,
+            test: self.test,
+            min_facets: self.min_facets,
+            min_measure: self.min_measure,
+            close_gaps: self.close_gaps,
+        }
+    }
+}
+
+/// What became of [`features_file`].
+#[derive(Clone, Debug)]
+pub struct FeaturesSummary {
+    /// How many features.
+    pub features: usize,
+    /// How many facets they have together.
+    pub facets: usize,
+    /// What was chosen and what became of it.
+    pub selection: Selection,
+    /// Whether b is the mesh's own, known at its points alone.
+    pub from_points: bool,
+}
+
+/// Finds the facets of a mesh that follow features of an image, or of the mesh's own field `potential`.
+///
+/// `image` is placed; it is b(x) itself if the request names a potential.
+///
+/// # Errors
+/// [`JobError`] if options make no sense, the image is of no use, the mesh has no such field, or the watch ends
+/// the work.
+pub fn features<const D: usize>(
+    request: &FeaturesRequest,
+    loaded: &LoadedMesh<D>,
+    image: Option<Image<D>>,
+    session: &mut Session<'_>,
+) -> Result<FeatureSet<D>, JobError> {
+    let field = match image {
+        Some(image) => along(request, loaded, image, session)?,
+        None => {
+            let Some(values) = loaded.point_field("potential") else {
+                let message =
+                    "the mesh has no field `potential`; expected IMAGE or --potential FILE";
+                return Err(JobError::misuse(message).about(&request.mesh));
+            };
+            FacetField::from_points(&loaded.mesh, values)
+                .map_err(|e| JobError::from(e).about(&request.mesh))?
+        }
+    };
+    Ok(find_features(&loaded.mesh, &field, &request.facet_options())?)
+}
+
+/// b along the facets, from an image or potential.
+fn along<const D: usize>(
+    request: &FeaturesRequest,
+    loaded: &LoadedMesh<D>,
+    image: Image<D>,
+    session: &mut Session<'_>,
+) -> Result<FacetField<D>, JobError> {
+    let path = request.source().unwrap_or(&request.mesh);
+    let made_in = mesh_file::units(loaded.provenance.as_ref());
+    let units = request.units.or(made_in).unwrap_or_default();
+    let run = RunConfig { features: request.features.clone(), ..RunConfig::default() };
+    let options: MeshOptions<D> = run.mesh_options()?;
+    let (frame, samples) = if request.potential.is_some() {
+        let (frame, samples) = image.into_parts();
+        (frame, given_potential(samples).map_err(|e| JobError::content(e).about(path))?)
+    } else {
+        let options = FeatureOptions { units, ..options.features };
+        let enhanced = enhance(&image, &options, session);
+        let enhanced = enhanced.map_err(|e| JobError::from(e).about_content(path))?;
+        (*image.frame(), enhanced.values)
+    };
+    let potential = ScalarField::potential(frame.grid(units), samples, options.interpolation);
+    let potential = potential.map_err(|e| JobError::content(e).about(path))?;
+    let mesh = lattice_mesh(&loaded.mesh, &frame, units);
+    Ok(FacetField::along(&mesh, &potential, session)?)
+}
+
+/// Finds features of files, and writes them.
+///
+/// # Errors
+/// As [`features()`], and if a file cannot be read or written.
+pub fn features_file(
+    request: &FeaturesRequest,
+    session: &mut Session<'_>,
+) -> Result<FeaturesSummary, JobError> {
+    let files = FeatureFiles::new(request, session)?;
+    match mesh_file::read(&request.mesh)? {
+        AnyMesh::Flat(mesh) => run(request, &files, &mesh, &Dimension::plane(), session),
+        AnyMesh::Volume(mesh) => run(request, &files, &mesh, &Dimension::space(), session),
+    }
+}
+
+fn run<const D: usize>(
+    request: &FeaturesRequest,
+    files: &FeatureFiles<'_>,
+    loaded: &LoadedMesh<D>,
+    dimension: &Dimension<D>,
+    session: &mut Session<'_>,
+) -> Result<FeaturesSummary, JobError> {
+    files.check_dimension(D)?;
+    let (frame, options) = (loaded.frame.as_ref(), &request.frame);
+    let beside = Beside { frame, options, role: ImageRole::Followed };
+    let image = match request.source() {
+        Some(path) => Some(beside.read(path, dimension, session)?),
+        None => None,
+    };
+    let from_points = image.is_none();
+    let found = features(request, loaded, image, session)?;
+    session.writing(|session| files.write(loaded, &found, session))?;
+    let facets = found.features.iter().map(|feature| feature.facets.len()).sum();
+    let (features, selection) = (found.features.len(), found.selection);
+    Ok(FeaturesSummary { features, facets, selection, from_points })
+}

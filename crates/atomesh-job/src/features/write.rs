@@ -1,0 +1,142 @@
+//! Writing features: as surfaces, as tags of the mesh, in numbers.
+
+use std::path::Path;
+
+use atomesh::features::FeatureSet;
+use atomesh::mesh::{Tags, is_feature_name};
+use atomesh_io::mesh::{LoadedMesh, MeshData, MeshFormat, write_mesh};
+use atomesh_io::surface::{SurfaceFormat, write_surface};
+use serde_json::json;
+
+use super::FeaturesRequest;
+use crate::error::JobError;
+use crate::files::{self, write_bytes};
+use crate::mesh_file;
+use crate::session::Session;
+
+/// The files to write, in formats that are known.
+pub(super) struct FeatureFiles<'a> {
+    request: &'a FeaturesRequest,
+    surface: Option<(&'a Path, SurfaceFormat)>,
+}
+
+impl<'a> FeatureFiles<'a> {
+    /// The files that a request names, found writable.
+    ///
+    /// # Errors
+    /// [`JobError`] if there are none, an extension is unknown, or a file cannot be written.
+    pub fn new(request: &'a FeaturesRequest, session: &mut Session<'_>) -> Result<Self, JobError> {
+        let outputs = [&request.output, &request.mesh_output, &request.json];
+        if outputs.iter().all(|path| path.is_none()) {
+            let message =
+                "nothing to write; expected -o SURFACE, --mesh-output MESH or --json JSON";
+            return Err(JobError::misuse(message));
+        }
+        let surface = match request.output.as_deref() {
+            Some(path) => Some((path, surface_format(path)?)),
+            None => None,
+        };
+        if let Some(path) = &request.mesh_output
+            && !MeshFormat::of(path).is_ok_and(MeshFormat::holds_tags)
+        {
+            let message = format!(
+                "unknown extension of a mesh file that holds tags; expected one of {}",
+                MeshFormat::tag_endings()
+            );
+            return Err(JobError::misuse(message).about(path));
+        }
+        files::check(outputs.into_iter().flatten().map(|path| path.as_path()), session)?;
+        Ok(Self { request, surface })
+    }
+
+    /// Refuses surfaces in a format for meshes of another dimension.
+    ///
+    /// # Errors
+    /// [`JobError`] says which formats there are.
+    pub fn check_dimension(&self, dimension: usize) -> Result<(), JobError> {
+        let Some((path, format)) = self.surface else { return Ok(()) };
+        format.check_dimension(dimension).map_err(|e| JobError::misuse(e).about(path))
+    }
+
+    /// Writes the files.
+    ///
+    /// # Errors
+    /// [`JobError`] names the file that cannot be written.
+    pub fn write<const D: usize>(
+        &self,
+        loaded: &LoadedMesh<D>,
+        found: &FeatureSet<D>,
+        session: &mut Session<'_>,
+    ) -> Result<(), JobError> {
+        let mesh = &loaded.mesh;
+        if let Some((path, _)) = self.surface {
+            let means: Vec<f32> = found.features.iter().map(|f| f.mean as f32).collect();
+            let written = write_surface(path, mesh, &found.groups(), Some(&means), session);
+            written.map_err(|e| JobError::from(e).about(path))?;
+        }
+        if let Some(path) = &self.request.mesh_output {
+            write_tagged(path, loaded, &self.tags(loaded, found)?, session)?;
+        }
+        if let Some(path) = &self.request.json {
+            let report = json!({
+                "selection": found.selection,
+                "intersections": found.intersections.len(),
+                "features": found.report(mesh),
+            });
+            write_bytes(path, format!("{report:#}\n").as_bytes())?;
+        }
+        Ok(())
+    }
+
+    /// The mesh's own tags without features that it had; the sides of its box if it has none; the features.
+    fn tags<const D: usize>(
+        &self,
+        loaded: &LoadedMesh<D>,
+        found: &FeatureSet<D>,
+    ) -> Result<Tags<D>, JobError> {
+        let mesh = &loaded.mesh;
+        let groups = loaded.tags.facet_groups();
+        let kept: Vec<_> =
+            groups.iter().filter(|group| !is_feature_name(&group.name)).cloned().collect();
+        let has_groups = !kept.is_empty();
+        let regions = match self.request.regions {
+            true => Some(found.regions(mesh, self.request.least_island)),
+            false => loaded.tags.regions().cloned(),
+        };
+        let mut tags = Tags::new(mesh, kept, regions).map_err(JobError::content)?;
+        if !has_groups {
+            let sides = mesh_file::own_sides(mesh, loaded.frame.as_ref());
+            tags = sides.merge(tags).map_err(JobError::content)?;
+        }
+        tags.merge(found.tags(mesh).map_err(JobError::content)?).map_err(JobError::content)
+    }
+}
+
+fn surface_format(path: &Path) -> Result<SurfaceFormat, JobError> {
+    SurfaceFormat::of(path).map_err(|_| {
+        let known = SurfaceFormat::EXTENSIONS;
+        let message = format!("unknown extension of a surface file; expected one of {known}");
+        JobError::misuse(message).about(path)
+    })
+}
+
+fn write_tagged<const D: usize>(
+    path: &Path,
+    loaded: &LoadedMesh<D>,
+    tags: &Tags<D>,
+    session: &mut Session<'_>,
+) -> Result<(), JobError> {
+    let mut data = MeshData::new(&loaded.mesh).with_tags(tags);
+    for field in &loaded.point_fields {
+        // a name that another program gave may not fit every format
+        let with = data.clone().with_point_field(&field.name, &field.values);
+        data = with.unwrap_or(data);
+    }
+    if let Some(frame) = &loaded.frame {
+        data = data.with_frame(frame);
+    }
+    if let Some(provenance) = &loaded.provenance {
+        data = data.with_provenance(provenance);
+    }
+    write_mesh(path, &data, session).map_err(|e| JobError::from(e).about(path))
+}

@@ -1,0 +1,123 @@
+//! Reading images.
+
+use std::path::Path;
+
+use atomesh::image::{Frame, Image};
+use atomesh::watch::Watch;
+use atomesh_io::image::{
+    AnyImage, ImageFormat, LoadedImage, ReadError, ReadOptions, ReadReason, load_image,
+};
+
+use crate::dimension::Dimension;
+use crate::error::JobError;
+use crate::memory;
+use crate::options::FrameOptions;
+use crate::session::{Note, Session};
+
+/// Reads an image, unless its file alone is larger than the memory available.
+///
+/// # Errors
+/// [`JobError`] if the file cannot be read or is not what its name says, or the watch ends the work.
+pub fn load(
+    path: &Path,
+    options: &ReadOptions,
+    watch: &mut dyn Watch,
+) -> Result<LoadedImage, JobError> {
+    memory::check_file(path).map_err(|e| e.advise("crop or resample the image first"))?;
+    load_image(path, options, watch).map_err(refusal)
+}
+
+fn refusal(error: ReadError) -> JobError {
+    let ReadError { path, reason, .. } = error;
+    match reason {
+        ReadReason::Cancelled(_) => JobError::cancelled(),
+        ReadReason::Io(_) | ReadReason::DataFile { .. } => JobError::file(&reason),
+        ReadReason::UnknownExtension { .. } => JobError::misuse(&reason)
+            .advise("rename the file, or describe raw samples by --shape and --dtype"),
+        ReadReason::NoRawLayout => JobError::misuse("raw samples say neither shape nor type")
+            .advise("give --shape NX,NY[,NZ] and --dtype TYPE"),
+        ReadReason::DuplicateTraces { .. } | ReadReason::SparseTraces { .. } => {
+            JobError::content(&reason)
+                .advise("--trace-bytes INLINE,XLINE says where; one byte twice makes a line")
+        }
+        ReadReason::RawSize { .. } | ReadReason::RawShape { .. } => JobError::misuse(&reason),
+        _ => JobError::content(&reason),
+    }
+    .about(&path)
+}
+
+/// Reads an image; what its reader took for granted becomes notes.
+///
+/// # Errors
+/// As [`load`].
+pub fn read(
+    path: &Path,
+    options: &ReadOptions,
+    session: &mut Session<'_>,
+) -> Result<AnyImage, JobError> {
+    let loaded = load(path, options, session)?;
+    for note in &loaded.notes {
+        let (is_warning, file) = (note.is_warning(), Some(path.into()));
+        session.note(Note { is_warning, file, text: note.to_string() });
+    }
+    Ok(loaded.image)
+}
+
+/// What an image that is read for a mesh is to the mesh.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum ImageRole {
+    /// What the mesh follows: it lies where the mesh's image did, and NaN samples are an error.
+    Followed,
+    /// A property that its cells get: a frame of its own counts, and NaN samples are none.
+    Property,
+}
+
+/// A mesh for which images are read.
+#[derive(Clone, Copy, Debug)]
+pub struct Beside<'a, const D: usize> {
+    /// The frame of the image that the mesh follows, if it is known; for images of its shape.
+    pub frame: Option<&'a Frame<D>>,
+    /// The options of the frame, which go before all.
+    pub options: &'a FrameOptions,
+    /// What the image is to the mesh.
+    pub role: ImageRole,
+}
+
+impl<const D: usize> Beside<'_, D> {
+    /// Reads the image and places it.
+    ///
+    /// # Errors
+    /// [`JobError`] as [`load`], and if the image has another dimension or the options do not fit it.
+    pub fn read(
+        &self,
+        path: &Path,
+        dimension: &Dimension<D>,
+        session: &mut Session<'_>,
+    ) -> Result<Image<D>, JobError> {
+        let any = read(path, &self.options.read_options()?, session)?;
+        let axes = any.dimension();
+        let Some(image) = (dimension.image)(any) else {
+            let message = format!("has {axes} axes; the mesh is made of {}", dimension.cells);
+            return Err(JobError::content(message).about(path));
+        };
+        let has_frame = ImageFormat::of(path).is_some_and(ImageFormat::has_frame);
+        self.place(image, has_frame).map_err(|e| e.about(path))
+    }
+
+    fn place(&self, image: Image<D>, has_frame: bool) -> Result<Image<D>, JobError> {
+        let keeps_own = has_frame && self.role == ImageRole::Property;
+        let known = self.frame.filter(|f| !keeps_own && f.shape() == image.frame().shape());
+        let frame = *known.unwrap_or(image.frame());
+        let image = image.with_frame(frame).map_err(JobError::content)?;
+        match self.role {
+            ImageRole::Followed => self.options.place(image),
+            ImageRole::Property => self.options.place_as_is(image),
+        }
+    }
+}
+
+/// Whether pictures show z upwards: it grows that way in the image's format, and along its last axis.
+pub(crate) fn is_z_up<const D: usize>(path: Option<&Path>, frame: &Frame<D>) -> bool {
+    let format = path.and_then(ImageFormat::of);
+    format.is_some_and(ImageFormat::z_is_height) && frame.direction()[D - 1][D - 1] > 0.0
+}

@@ -1,0 +1,225 @@
+//! How good any mesh is, for an image potential.
+
+use std::path::{Path, PathBuf};
+
+use atomesh::enhance::given_potential;
+use atomesh::image::{Frame, Image, Samples, Units};
+use atomesh::measure::{WantedSize, fidelity, homogeneity};
+use atomesh::mesh::Mesh;
+use atomesh::run::{MeshReport, lattice_mesh};
+use atomesh_draw::Style;
+use atomesh_io::mesh::{AnyMesh, LoadedMesh};
+
+use crate::dimension::Dimension;
+use crate::error::JobError;
+use crate::files::{self, write_bytes};
+use crate::images::{Beside, ImageRole, is_z_up};
+use crate::mesh_file;
+use crate::options::FrameOptions;
+use crate::page::{PageParts, Shown, caption, option_rows, write_page};
+use crate::session::Session;
+#[cfg(feature = "clap")]
+use crate::values::{named, number_in};
+
+/// A mesh, what it is measured against, and where the report goes.
+#[derive(Clone, Debug, Default, PartialEq)]
+#[cfg_attr(feature = "clap", derive(clap::Args))]
+pub struct MeasureRequest {
+    /// Mesh to measure, in world coordinates: .vtu .vtk .msh .msh2 .npz .inp
+    #[cfg_attr(feature = "clap", arg(value_name = "MESH"))]
+    pub mesh: PathBuf,
+    /// Potential b(x), an image with values from -1 (features) to 1. Its frame is that of the options
+    /// below, else of the mesh if atomesh wrote it, else of this file
+    #[cfg_attr(feature = "clap", arg(long, value_name = "FILE"))]
+    pub potential: PathBuf,
+    /// Edge length d of the mesh in lattice units, above 0. Default: the mean of the field `distance` of the
+    /// mesh
+    #[cfg_attr(feature = "clap", arg(long, value_name = "D", allow_hyphen_values = true,
+        value_parser = number_in(f64::MIN_POSITIVE, f64::MAX, "a length above 0")))]
+    pub size: Option<f64>,
+    /// Lattice units in which shape is measured. Default: those in which the mesh was made, else
+    /// physical
+    #[cfg_attr(feature = "clap", arg(long, value_name = "UNITS",
+        value_parser = named::<Units>(&["physical", "samples"])))]
+    pub units: Option<Units>,
+    /// Image to rebuild from the mesh: fidelity is the error that is left, with a constant in each cell and
+    /// with the best continuous linear fit
+    #[cfg_attr(feature = "clap", arg(long, value_name = "FILE"))]
+    pub image: Option<PathBuf>,
+    /// Image of labels, whole numbers: homogeneity is the share of a cell that its dominant label fills
+    #[cfg_attr(feature = "clap", arg(long, value_name = "FILE"))]
+    pub labels: Option<PathBuf>,
+    /// File for the report as JSON. Default: standard output, unless --html is given
+    #[cfg_attr(feature = "clap", arg(long, value_name = "JSON"))]
+    pub json: Option<PathBuf>,
+    /// File for the report as one self-contained HTML page with a picture and histograms
+    #[cfg_attr(feature = "clap", arg(long, value_name = "HTML"))]
+    pub html: Option<PathBuf>,
+    /// Frame.
+    #[cfg_attr(feature = "clap", command(flatten, next_help_heading = "Frame"))]
+    pub frame: FrameOptions,
+}
+
+/// What a mesh is measured against: images in place.
+#[derive(Clone, Debug)]
+pub struct Against<const D: usize> {
+    frame: Frame<D>,
+    /// b(x), values −1…1.
+    potential: Vec<f32>,
+    /// What is rebuilt from the mesh.
+    pub image: Option<Image<D>>,
+    /// Labels.
+    pub labels: Option<Image<D>>,
+}
+
+impl<const D: usize> Against<D> {
+    /// A potential alone.
+    ///
+    /// # Errors
+    /// [`JobError`] if a sample is outside −1…1.
+    pub fn potential(potential: Image<D>) -> Result<Self, JobError> {
+        let (frame, samples) = potential.into_parts();
+        let potential = given_potential(samples).map_err(JobError::content)?;
+        Ok(Self { frame, potential, image: None, labels: None })
+    }
+}
+
+/// Measures a mesh against images.
+///
+/// # Errors
+/// [`JobError`] if labels are no whole numbers, no size is known, or the watch ends the work.
+pub fn measure<const D: usize>(
+    request: &MeasureRequest,
+    loaded: &LoadedMesh<D>,
+    against: &Against<D>,
+    session: &mut Session<'_>,
+) -> Result<MeshReport, JobError> {
+    let units = lattice_units(request, loaded);
+    let mesh = lattice_mesh(&loaded.mesh, &against.frame, units);
+    let field = loaded.point_field("distance").filter(|_| request.size.is_none());
+    let Some(size) = request.size.or_else(|| mean(&mesh, field?)) else {
+        let message = "the mesh has no field `distance`; expected --size D";
+        return Err(JobError::misuse(message).about(&request.mesh));
+    };
+    let size = WantedSize { mean: size, at_points: field };
+    let grid = against.frame.grid(units);
+    let report = MeshReport::new(&mesh, &grid, &against.potential, size, session);
+    let mut report = report.map_err(|e| JobError::from(e).about(&request.mesh))?;
+    if let Some(image) = &against.image {
+        let found = fidelity(&loaded.mesh, image.frame(), image.samples(), session);
+        let found = found.map_err(|e| JobError::from(e).about_any(request.image.as_deref()))?;
+        report.fidelity = Some(found);
+    }
+    if let Some(labels) = &against.labels {
+        let found = homogeneity(&loaded.mesh, labels, session);
+        let found = found.map_err(|e| JobError::from(e).about_any(request.labels.as_deref()))?;
+        report.homogeneity = Some(found);
+    }
+    Ok(report)
+}
+
+fn lattice_units<const D: usize>(request: &MeasureRequest, loaded: &LoadedMesh<D>) -> Units {
+    let made_in = mesh_file::units(loaded.provenance.as_ref());
+    request.units.or(made_in).unwrap_or_default()
+}
+
+/// Measures the files of a request, and writes those that it names.
+///
+/// # Errors
+/// As [`measure`], and if a file cannot be read or written.
+pub fn measure_file(
+    request: &MeasureRequest,
+    session: &mut Session<'_>,
+) -> Result<MeshReport, JobError> {
+    let outputs = request.json.iter().chain(&request.html);
+    files::check(outputs.map(PathBuf::as_path), session)?;
+    let report = match mesh_file::read(&request.mesh)? {
+        AnyMesh::Flat(mesh) => run(request, &mesh, &Dimension::plane(), session)?,
+        AnyMesh::Volume(mesh) => run(request, &mesh, &Dimension::space(), session)?,
+    };
+    if let Some(path) = &request.json {
+        let text = serde_json::to_string_pretty(&report).map_err(JobError::content)? + "\n";
+        session.writing(|_| write_bytes(path, text.as_bytes()))?;
+    }
+    Ok(report)
+}
+
+fn run<const D: usize>(
+    request: &MeasureRequest,
+    loaded: &LoadedMesh<D>,
+    dimension: &Dimension<D>,
+    session: &mut Session<'_>,
+) -> Result<MeshReport, JobError> {
+    let (frame, options) = (loaded.frame.as_ref(), &request.frame);
+    let beside = Beside { frame, options, role: ImageRole::Followed };
+    let mut read = |path: &Path| beside.read(path, dimension, session);
+    let potential = read(&request.potential)?;
+    let image = request.image.as_deref().map(&mut read).transpose()?;
+    let labels = request.labels.as_deref().map(&mut read).transpose()?;
+    let against = Against::potential(potential).map_err(|e| e.about(&request.potential))?;
+    let against = Against { image, labels, ..against };
+    let report = measure(request, loaded, &against, session)?;
+    if let Some(path) = &request.html {
+        let page = Page { request, loaded, against: &against };
+        session.writing(|_| page.write(path, &report, dimension))?;
+    }
+    Ok(report)
+}
+
+/// A measured mesh as a page.
+struct Page<'a, const D: usize> {
+    request: &'a MeasureRequest,
+    loaded: &'a LoadedMesh<D>,
+    against: &'a Against<D>,
+}
+
+impl<const D: usize> Page<'_, D> {
+    /// Writes the page, the mesh drawn over the image, or else over the potential.
+    fn write(
+        &self,
+        path: &Path,
+        report: &MeshReport,
+        dimension: &Dimension<D>,
+    ) -> Result<(), JobError> {
+        let (request, loaded) = (self.request, self.loaded);
+        let potential;
+        let image = match &self.against.image {
+            Some(image) => image,
+            None => {
+                let samples = Samples::F32(self.against.potential.clone());
+                potential = Image::new(self.against.frame, samples).map_err(JobError::content)?;
+                &potential
+            }
+        };
+        let mesh = lattice_mesh(&loaded.mesh, image.frame(), Units::Samples);
+        let file = request.image.as_ref().unwrap_or(&request.potential);
+        let z_up = is_z_up(Some(file), image.frame());
+        let style = Style { units: lattice_units(request, loaded), z_up, ..Style::default() };
+        let made = loaded.provenance.as_ref();
+        let by = made.map_or(String::new(), |p| format!("; made by atomesh {}", p.version));
+        let parts = PageParts {
+            mesh: &request.mesh,
+            subtitle: format!("{} measured against a potential{by}", dimension.cells),
+            caption: caption::<D>(file),
+            tables: vec![(
+                "Options of the mesh".into(),
+                made.map(|p| option_rows(&p.options)).unwrap_or_default(),
+            )],
+            warnings: vec![],
+        };
+        write_page(path, parts, report, &Shown { image, mesh: &mesh, style: &style }, dimension)
+    }
+}
+
+/// The mean over the mesh of a field at its points.
+fn mean<const D: usize>(mesh: &Mesh<D>, field: &[f32]) -> Option<f64> {
+    let (mut sum, mut total) = (0.0, 0.0);
+    for (cell, simplex) in mesh.cells().zip(mesh.simplices()) {
+        let measure = simplex.measure().abs();
+        let values: f64 = cell.iter().map(|&i| f64::from(field[i as usize])).sum();
+        sum += measure * values / cell.len() as f64;
+        total += measure;
+    }
+    let mean = sum / total;
+    (mean.is_finite() && mean > 0.0).then_some(mean)
+}

@@ -1,0 +1,225 @@
+//! From an image to a mesh.
+//!
+//! [`mesh`] is the job in memory: options and images in, [`Outcome`] out. [`mesh_file`] is the same from file
+//! to file, and [`expect`] says what it would take. Options, formats and places of files are checked before an
+//! image is read.
+
+mod figures;
+mod format;
+mod inputs;
+mod outputs;
+mod refusal;
+mod write;
+
+pub use figures::{Figures, Measured};
+pub(crate) use inputs::shown;
+pub use inputs::{MeshImages, read_shown};
+pub(crate) use refusal::refusal;
+pub use write::Tagged;
+
+use std::path::{Path, PathBuf};
+
+use atomesh::image::Image;
+use atomesh::improve::ImproveReport;
+use atomesh::run::{Estimate, Outcome, Prepared};
+use atomesh_io::image::AnyImage;
+
+use crate::dimension::Dimension;
+use crate::error::JobError;
+use crate::files::write_bytes;
+use crate::memory;
+use crate::options::RunConfig;
+use crate::session::Session;
+use figures::RunPage;
+use outputs::Outputs;
+use write::Writing;
+
+/// Makes b(x), d(x) and β(x), and gives the image back. Memory is limited to what is available.
+///
+/// # Errors
+/// [`JobError`] if options make no sense or an image is of no use.
+pub fn prepare<const D: usize>(
+    run: &RunConfig,
+    mut images: MeshImages<D>,
+    dimension: &Dimension<D>,
+    session: &mut Session<'_>,
+) -> Result<(Prepared<D>, Image<D>), JobError> {
+    let mut options = run.mesh_options::<D>()?;
+    options.memory_limit = memory::available();
+    let potential = images.take_potential(run)?;
+    let inputs = images.inputs(potential.as_ref());
+    let prepared = atomesh::run::prepare(&dimension.method, inputs, options, session);
+    let prepared = prepared.map_err(|e| refusal(run, e))?;
+    for warning in prepared.warnings() {
+        session.warn(run.input.shown(), warning);
+    }
+    Ok((prepared, images.image))
+}
+
+/// Meshes images.
+///
+/// # Errors
+/// [`JobError`] if options make no sense, an image is of no use, memory does not suffice, or the watch ends
+/// the work.
+pub fn mesh<const D: usize>(
+    run: &RunConfig,
+    images: MeshImages<D>,
+    dimension: &Dimension<D>,
+    session: &mut Session<'_>,
+) -> Result<Outcome<D>, JobError> {
+    let (prepared, image) = prepare(run, images, dimension, session)?;
+    drop(image);
+    prepared.run(session).map_err(|e| refusal(run, e))
+}
+
+/// What became of a run from file to file.
+#[derive(Clone, Debug)]
+pub struct MeshSummary {
+    /// The mesh's file.
+    pub mesh: PathBuf,
+    /// What its cells are called.
+    pub cells: &'static str,
+    /// What was measured.
+    pub figures: Figures,
+    /// What was improved.
+    pub improved: Option<ImproveReport>,
+    /// The features that were tagged, if that was asked for.
+    pub tagged: Option<Tagged>,
+}
+
+/// What a run would take.
+#[derive(Clone, Debug)]
+pub struct Expectation {
+    /// Atoms, cells and memory.
+    pub estimate: Estimate,
+    /// How many cells.
+    pub cell_count: u64,
+    /// What the cells are called.
+    pub cells: &'static str,
+    /// From growth to mesh.
+    pub seconds: f64,
+}
+
+/// How [`mesh_file`] does its work.
+#[derive(Clone, Copy, Debug, Default)]
+pub struct MeshFileOptions<'a> {
+    /// Where all options are written, with their defaults.
+    pub write_config: Option<&'a Path>,
+    /// Whether the shape is measured though no report asks for it.
+    pub measures_shape: bool,
+}
+
+/// Meshes the files that options name, and writes those that they name.
+///
+/// # Errors
+/// [`JobError`] as [`mesh()`], and if a file cannot be read or written.
+pub fn mesh_file(
+    mut run: RunConfig,
+    options: &MeshFileOptions<'_>,
+    session: &mut Session<'_>,
+) -> Result<MeshSummary, JobError> {
+    run.take_labels_alone();
+    run.check()?;
+    shown(&run)?;
+    let outputs = Outputs::new(&run, options.write_config)?;
+    outputs.check(&run, session)?;
+    let work = FileRun { run: &run, outputs: &outputs, options };
+    match read_shown(&run, session)? {
+        AnyImage::Flat(image) => work.run(image, &Dimension::plane(), session),
+        AnyImage::Volume(image) => work.run(image, &Dimension::space(), session),
+    }
+}
+
+/// Says what [`mesh_file`] would take; writes nothing.
+///
+/// # Errors
+/// As [`mesh_file`].
+pub fn expect(mut run: RunConfig, session: &mut Session<'_>) -> Result<Expectation, JobError> {
+    run.take_labels_alone();
+    run.check()?;
+    match read_shown(&run, session)? {
+        AnyImage::Flat(image) => expect_image(&run, image, &Dimension::plane(), session),
+        AnyImage::Volume(image) => expect_image(&run, image, &Dimension::space(), session),
+    }
+}
+
+/// Seconds that an atom takes from growth to mesh, by dimension; a guide, from our own runs.
+const SECONDS_PER_ATOM: [f64; 2] = [5e-5, 1.2e-5];
+
+fn expect_image<const D: usize>(
+    run: &RunConfig,
+    image: Image<D>,
+    dimension: &Dimension<D>,
+    session: &mut Session<'_>,
+) -> Result<Expectation, JobError> {
+    let images = MeshImages::read_fields(run, image, dimension, session)?;
+    let (prepared, _) = prepare(run, images, dimension, session)?;
+    let estimate = prepared.estimate();
+    let (cell_count, cells) = match run.is_voronoi() {
+        true => (estimate.atoms, dimension.voronoi_cells),
+        false => (estimate.cells, dimension.cells),
+    };
+    let seconds = (estimate.atoms as f64 * SECONDS_PER_ATOM[D - 2]).max(0.1);
+    Ok(Expectation { estimate, cell_count, cells, seconds })
+}
+
+/// A run from file to file whose options are known.
+struct FileRun<'a> {
+    run: &'a RunConfig,
+    outputs: &'a Outputs,
+    options: &'a MeshFileOptions<'a>,
+}
+
+impl FileRun<'_> {
+    fn run<const D: usize>(
+        &self,
+        image: Image<D>,
+        dimension: &Dimension<D>,
+        session: &mut Session<'_>,
+    ) -> Result<MeshSummary, JobError> {
+        let (run, outputs) = (self.run, self.outputs);
+        let images = MeshImages::read_fields(run, image, dimension, session)?;
+        let (prepared, image) = prepare(run, images, dimension, session)?;
+        let image = outputs.needs_image().then_some(image);
+        let outcome = prepared.run(session).map_err(|e| refusal(run, e))?;
+        let measured = match &image {
+            Some(image) if outputs.needs_report() => Measured::All(image),
+            _ if self.options.measures_shape => Measured::Shape,
+            _ => Measured::Nothing,
+        };
+        let figures = Figures::new(run, &outcome, measured, session)?;
+        let writing = Writing { run, outputs, outcome: &outcome, dimension };
+        let tagged = session.writing(|session| -> Result<_, JobError> {
+            let tagged = writing.write(image.as_ref(), session)?;
+            self.write_about(&writing, image.as_ref(), &figures, session)?;
+            Ok(tagged)
+        })?;
+        let cells = if run.is_voronoi() { dimension.voronoi_cells } else { dimension.cells };
+        let (mesh, improved) = (outputs.mesh.clone(), outcome.improve_report().cloned());
+        Ok(MeshSummary { mesh, cells, figures, improved, tagged })
+    }
+
+    /// Writes the options and reports.
+    fn write_about<const D: usize>(
+        &self,
+        writing: &Writing<'_, D>,
+        image: Option<&Image<D>>,
+        figures: &Figures,
+        session: &mut Session<'_>,
+    ) -> Result<(), JobError> {
+        let Writing { run, outputs, outcome, dimension } = *writing;
+        if let Some(path) = &outputs.config {
+            write_bytes(path, run.clone().with_defaults::<D>().to_toml()?.as_bytes())?;
+        }
+        session.end_phase();
+        if let Some(path) = &outputs.report {
+            let text = format!("{:#}\n", figures.json(run, outcome, session));
+            write_bytes(path, text.as_bytes())?;
+        }
+        if let (Some(path), Some(image), Some(report)) = (&outputs.html, image, &figures.report) {
+            let page = RunPage { run, outcome, image, report, style: writing.style() };
+            page.write(path, &outputs.mesh, dimension, session)?;
+        }
+        Ok(())
+    }
+}

@@ -1,0 +1,152 @@
+//! The files that are written with a mesh, in formats that are known before the work.
+
+use std::path::{Path, PathBuf};
+
+use atomesh_io::mesh::cells::ConnectionFiles;
+
+use super::format::OutputFormat;
+use crate::error::JobError;
+use crate::files::{self, PictureFile, has_extension, unknown_extension};
+use crate::options::{Backdrop, OutputOptions, RunConfig};
+use crate::session::Session;
+
+/// Where everything goes.
+#[derive(Clone, Debug)]
+pub(super) struct Outputs {
+    pub mesh: PathBuf,
+    pub format: OutputFormat,
+    pub connections: Option<ConnectionFiles>,
+    pub picture: Option<PictureFile>,
+    pub backdrop: Backdrop,
+    pub report: Option<PathBuf>,
+    /// The report as a page.
+    pub html: Option<PathBuf>,
+    pub potential: Option<PathBuf>,
+    /// The options of the run, written for another.
+    pub config: Option<PathBuf>,
+    /// Whether cells of second order are written.
+    pub is_quadratic: bool,
+    /// Facets with b up to this are tagged as features.
+    pub tag_features: Option<f64>,
+    /// The parts that features cut off become regions, unless they have fewer cells than this.
+    pub regions: Option<usize>,
+}
+
+impl Outputs {
+    /// The files of a run.
+    ///
+    /// # Errors
+    /// [`JobError`] if the mesh is missing, an extension is unknown, or options contradict each other.
+    pub fn new(run: &RunConfig, config: Option<&Path>) -> Result<Self, JobError> {
+        let options = &run.output;
+        let Some(mesh) = options.output.clone() else {
+            return Err(JobError::misuse("no mesh to write; expected -o MESH, as in -o mesh.vtu"));
+        };
+        let is_voronoi = run.is_voronoi();
+        let format = OutputFormat::of(&mesh, is_voronoi, options.msh.as_deref())?;
+        let connections = connections(options, is_voronoi)?;
+        let picture = PictureFile::of(options.picture.as_ref())?;
+        if let Some(path) = &options.write_potential {
+            files::check_potential(path)?;
+        }
+        let (report, html) = reports(options)?;
+        let is_quadratic = options.order == Some(2);
+        if is_quadratic && !format.holds_quadratic() {
+            let message = "--order 2 is for .vtu .vtk .msh .msh2 .inp files";
+            return Err(JobError::misuse(message).about(&mesh));
+        }
+        if options.tag_features.is_some() && !format.holds_tags() {
+            let message = "the format holds no tags; expected .vtu, .msh, .msh2, .inp or polyMesh";
+            return Err(JobError::misuse(message).about(&mesh));
+        }
+        let regions = regions(run)?;
+        if let (Some(page), true) = (&html, is_voronoi) {
+            let refusal =
+                JobError::misuse("a page shows triangles or tetrahedra, not Voronoi cells");
+            return Err(refusal.about(page).advise("ask for --report in JSON, and --picture"));
+        }
+        Ok(Self {
+            mesh,
+            format,
+            connections,
+            picture,
+            backdrop: options.picture_of.unwrap_or_default(),
+            report,
+            html,
+            potential: options.write_potential.clone(),
+            config: config.map(Path::to_path_buf),
+            is_quadratic,
+            tag_features: options.tag_features,
+            regions,
+        })
+    }
+
+    /// Whether the image is still needed after the atoms have felt it.
+    pub fn needs_image(&self) -> bool {
+        self.picture.is_some() || self.needs_report()
+    }
+
+    /// Whether the mesh is to be measured against the features and the image.
+    pub fn needs_report(&self) -> bool {
+        self.report.is_some() || self.html.is_some()
+    }
+
+    /// Tries whether every file can be written, and would not take the place of another or of an
+    /// input.
+    ///
+    /// # Errors
+    /// [`JobError`] names the first that does not.
+    pub fn check(&self, run: &RunConfig, session: &mut Session<'_>) -> Result<(), JobError> {
+        let picture = self.picture.as_ref().map(|picture| &picture.path);
+        let (report, html) = (self.report.as_ref(), self.html.as_ref());
+        let others = [Some(&self.mesh), picture, report, html, self.potential.as_ref()];
+        let others = others.into_iter().flatten().map(PathBuf::as_path);
+        let tables = self.connections.iter().flat_map(ConnectionFiles::paths);
+        let all = others.chain(tables).chain(self.config.as_deref());
+        files::check_apart(run.input.paths(), all, session)
+    }
+}
+
+fn connections(
+    options: &OutputOptions,
+    is_voronoi: bool,
+) -> Result<Option<ConnectionFiles>, JobError> {
+    let Some(head) = options.connections.as_deref() else { return Ok(None) };
+    if !is_voronoi {
+        let refusal = JobError::misuse("--connections lists those of Voronoi cells");
+        return Err(refusal.about(head).advise("add --mesh voronoi"));
+    }
+    if head.extension().is_none_or(|extension| extension != "json") {
+        return Err(unknown_extension(head, ".json"));
+    }
+    Ok(Some(ConnectionFiles::of(head)))
+}
+
+/// The files of the report as JSON and as a page.
+fn reports(options: &OutputOptions) -> Result<(Option<PathBuf>, Option<PathBuf>), JobError> {
+    match (options.report.clone(), options.html.clone()) {
+        (Some(report), Some(_)) if has_extension(&report, "html") => {
+            let message = "--html names another page; expected one, or a report in JSON";
+            Err(JobError::misuse(message).about(&report))
+        }
+        (Some(page), None) if has_extension(&page, "html") => Ok((None, Some(page))),
+        other => Ok(other),
+    }
+}
+
+/// The least size of the parts that become regions, if they do.
+fn regions(run: &RunConfig) -> Result<Option<usize>, JobError> {
+    if run.output.regions != Some(true) {
+        return Ok(None);
+    }
+    if run.output.tag_features.is_none() {
+        let message =
+            "--regions without --tag-features; expected both, since features cut the mesh";
+        return Err(JobError::misuse(message));
+    }
+    if let Some(labels) = &run.input.labels {
+        let message = "are regions already; expected them or --regions";
+        return Err(JobError::misuse(message).about(labels));
+    }
+    Ok(Some(run.regions.least_island.unwrap_or(0) as usize))
+}

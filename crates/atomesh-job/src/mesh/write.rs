@@ -1,0 +1,209 @@
+//! Writing a mesh and what is written with it.
+
+use std::path::Path;
+
+use atomesh::features::FeatureFacetOptions;
+use atomesh::image::{Image, Samples};
+use atomesh::mesh::{Mesh, Regions, Tags};
+use atomesh::run::Outcome;
+use atomesh::watch::Phase;
+use atomesh_draw::Style;
+use atomesh_io::atomic_file::AtomicFile;
+use atomesh_io::image::write_image;
+use atomesh_io::mesh::cells::{CellData, foam_mesh_of, write_cells_vtu, write_connections};
+use atomesh_io::mesh::openfoam::write_foam_mesh;
+use atomesh_io::mesh::{MeshData, MeshFormat, MeshWriteError, Provenance, write_mesh_as};
+
+use super::format::OutputFormat;
+use super::outputs::Outputs;
+use crate::dimension::Dimension;
+use crate::error::JobError;
+use crate::images::is_z_up;
+use crate::options::{Backdrop, RunConfig};
+use crate::session::Session;
+
+/// Facets that were tagged as features.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct Tagged {
+    /// How many features.
+    pub features: usize,
+    /// How many facets they have together.
+    pub facets: usize,
+}
+
+/// A mesh to be written.
+pub(super) struct Writing<'a, const D: usize> {
+    pub run: &'a RunConfig,
+    pub outputs: &'a Outputs,
+    pub outcome: &'a Outcome<D>,
+    pub dimension: &'a Dimension<D>,
+}
+
+impl<const D: usize> Writing<'_, D> {
+    /// Writes picture, potential and mesh; says what was tagged.
+    ///
+    /// # Errors
+    /// [`JobError`] if a file cannot be written, or the watch ends the work.
+    pub fn write(
+        &self,
+        image: Option<&Image<D>>,
+        session: &mut Session<'_>,
+    ) -> Result<Option<Tagged>, JobError> {
+        if let (Some(file), Some(image)) = (&self.outputs.picture, image) {
+            session.begin(Phase::Draw);
+            let style = self.style();
+            let backdrop = self.backdrop()?;
+            let image = backdrop.as_ref().unwrap_or(image);
+            let picture = match self.outcome.sample_cells() {
+                Some(cells) => (self.dimension.drawing.cells)(image, &cells, &style),
+                None => (self.dimension.drawing.mesh)(image, &self.outcome.sample_mesh(), &style),
+            };
+            file.write(&picture.map_err(JobError::content)?)?;
+        }
+        session.begin(Phase::Write);
+        if let Some(path) = &self.outputs.potential {
+            self.write_potential(path, session)?;
+        }
+        let provenance = self.run.provenance::<D>();
+        match self.outputs.format {
+            OutputFormat::Simplices(format) => self.write_simplices(format, &provenance, session),
+            _ => self.write_voronoi(&provenance, session).map(|()| None),
+        }
+    }
+
+    /// How the mesh is drawn.
+    pub fn style(&self) -> Style {
+        let z_up = is_z_up(self.run.input.shown(), self.outcome.frame());
+        Style { units: self.outcome.units(), z_up, ..Style::default() }
+    }
+
+    /// What is drawn behind the mesh; `None`: the image.
+    fn backdrop(&self) -> Result<Option<Image<D>>, JobError> {
+        let values = match self.outputs.backdrop {
+            Backdrop::Image => return Ok(None),
+            Backdrop::Potential => self.outcome.potential().samples().to_vec(),
+            Backdrop::Distance => self.outcome.distance_at_samples(),
+            Backdrop::Density => self.outcome.feature_density(),
+        };
+        let image = Image::new(*self.outcome.frame(), Samples::F32(values));
+        image.map(Some).map_err(JobError::content)
+    }
+
+    fn write_potential(&self, path: &Path, session: &mut Session<'_>) -> Result<(), JobError> {
+        let samples = Samples::F32(self.outcome.potential().samples().to_vec());
+        let image = Image::new(*self.outcome.frame(), samples).map_err(JobError::content)?;
+        Ok(write_image(path, &image, session)?)
+    }
+
+    fn write_simplices(
+        &self,
+        format: MeshFormat,
+        provenance: &Provenance,
+        session: &mut Session<'_>,
+    ) -> Result<Option<Tagged>, JobError> {
+        let outcome = self.outcome;
+        let mesh = outcome.world_mesh();
+        let quadratic = self.outputs.is_quadratic.then(|| outcome.quadratic());
+        let at_nodes = |values: &[f32]| match &quadratic {
+            Some(quadratic) => quadratic.extend(values),
+            None => values.to_vec(),
+        };
+        let distance = at_nodes(outcome.distance_at_points());
+        let values = at_nodes(outcome.potential_at_points());
+        // formats that hold tags have them as regions
+        let labels = outcome.labels().filter(|_| !self.outputs.format.holds_tags());
+        let labels = labels.map(|l| l.iter().map(|&l| l as f32).collect::<Vec<f32>>());
+        let (tags, tagged) = self.tags(&mesh, session)?;
+        let mut data = MeshData::new(&mesh)
+            .with_frame(outcome.frame())
+            .with_provenance(provenance)
+            .with_tags(&tags);
+        if let Some(quadratic) = &quadratic {
+            data = data.with_quadratic(quadratic);
+        }
+        data = data.with_point_field("distance", &distance).map_err(JobError::content)?;
+        data = data.with_point_field("potential", &values).map_err(JobError::content)?;
+        if let Some(labels) = &labels {
+            data = data.with_cell_field("label", labels).map_err(JobError::content)?;
+        }
+        let written = write_mesh_as(&self.outputs.mesh, format, &data, session);
+        written.map_err(|e| JobError::from(e).about(&self.outputs.mesh))?;
+        Ok(tagged)
+    }
+
+    /// The sides of the box, outline and labels, and the features if they are asked for.
+    fn tags(
+        &self,
+        world: &Mesh<D>,
+        session: &mut Session<'_>,
+    ) -> Result<(Tags<D>, Option<Tagged>), JobError> {
+        let sides = self.outcome.tags().map_err(JobError::content)?;
+        let Some(below) = self.outputs.tag_features else { return Ok((sides, None)) };
+        let options = FeatureFacetOptions { below, ..FeatureFacetOptions::default() };
+        let found = self.outcome.features(world, &options, session).map_err(|e| {
+            if e.is_cancelled() { JobError::cancelled() } else { JobError::misuse(e) }
+        })?;
+        let mut features = found.tags(world).map_err(JobError::content)?;
+        if let Some(least) = self.outputs.regions {
+            features = with_regions(features, world, found.regions(world, least))?;
+        }
+        let facets = found.features.iter().map(|feature| feature.facets.len()).sum();
+        let tagged = Tagged { features: found.features.len(), facets };
+        let tags = sides.merge(features).map_err(JobError::content)?;
+        Ok((tags, Some(tagged)))
+    }
+
+    /// Writes Voronoi cells and their connections.
+    fn write_voronoi(
+        &self,
+        provenance: &Provenance,
+        session: &mut Session<'_>,
+    ) -> Result<(), JobError> {
+        let (outputs, path) = (self.outputs, &self.outputs.mesh);
+        let Some(mesh) = self.outcome.world_cells() else {
+            return Err(JobError::content("the run made no Voronoi cells"));
+        };
+        let is_foam = outputs.format == OutputFormat::VoronoiFoam;
+        // the VTU file does not name them
+        let names_features = outputs.connections.is_some() || is_foam;
+        let features = names_features.then(|| self.outcome.cell_features()).flatten();
+        let features = features.unwrap_or_default();
+        let frame = self.outcome.frame();
+        let data = CellData { mesh: &mesh, features: &features, frame, provenance };
+        let written = if is_foam {
+            let mesh = foam_mesh_of(&data).map_err(JobError::content)?;
+            write_foam_mesh(path, &mesh, session)
+        } else {
+            write_vtu(path, &data, session)
+        };
+        written.map_err(|e| JobError::from(e).about(path))?;
+        if let Some(files) = &outputs.connections {
+            let written = write_connections(files, &data, session);
+            written.map_err(|e| JobError::from(e).about(path))?;
+        }
+        Ok(())
+    }
+}
+
+fn write_vtu<const D: usize>(
+    path: &Path,
+    data: &CellData<'_, D>,
+    session: &mut Session<'_>,
+) -> Result<(), MeshWriteError> {
+    let mut file = AtomicFile::create(path)?;
+    write_cells_vtu(&mut file, data, session)?;
+    Ok(file.commit()?)
+}
+
+/// The tags with regions beside them.
+///
+/// # Errors
+/// [`JobError`] if they have regions.
+fn with_regions<const D: usize>(
+    tags: Tags<D>,
+    mesh: &Mesh<D>,
+    regions: Regions,
+) -> Result<Tags<D>, JobError> {
+    let regions = Tags::new(mesh, Vec::new(), Some(regions)).map_err(JobError::content)?;
+    tags.merge(regions).map_err(JobError::content)
+}

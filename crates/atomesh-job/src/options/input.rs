@@ -1,0 +1,56 @@
+//! The files that a mesh is made from.
+
+use std::path::{Path, PathBuf};
+
+use super::section::section;
+
+section! {
+    /// The files that a mesh is made from.
+    pub struct InputOptions {
+        /// Image to mesh: .png .jpg .pgm .tif .npy .nii .nii.gz .nrrd .mha .vti .segy .rsf, a folder of
+        /// DICOM slices, or raw samples with --shape and --dtype. Two axes make triangles, three make
+        /// tetrahedra
+        #[arg(value_name = "IMAGE", help_heading = "Arguments")]
+        pub image: PathBuf,
+        /// Image potential b(x) to use as it is, values from -1 (attracts) to 1 (repels), instead of
+        /// the features of IMAGE. With both, IMAGE gives the frame and the picture
+        #[arg(long, value_name = "FILE")]
+        pub potential: PathBuf,
+        /// Nominal distance d(x) in lattice units, an image of the same shape as IMAGE; replaces --size
+        #[arg(long, value_name = "FILE", conflicts_with = "size")]
+        pub size_field: PathBuf,
+        /// Weight β(x), 0 to 1, an image of the same shape as IMAGE; replaces --beta
+        #[arg(long, value_name = "FILE", conflicts_with = "beta")]
+        pub beta_field: PathBuf,
+        /// Mask, an image of the same shape as IMAGE: mesh only where it is not 0 (where it is at least 0.5, if
+        /// its values are shares from 0 to 1), up to its smooth outline
+        #[arg(long, value_name = "FILE")]
+        pub mask: PathBuf,
+        /// Labels, an image of integers of the same shape as IMAGE: each cell gets the label that covers most
+        /// of it, and facets between two labels are tagged, as interface-2-5. Without IMAGE, or with
+        /// --features labels, atoms are attracted to the boundaries between labels
+        #[arg(long, value_name = "FILE")]
+        pub labels: PathBuf,
+    }
+}
+
+impl InputOptions {
+    /// All files that are read.
+    pub fn paths(&self) -> impl Iterator<Item = &Path> {
+        let all = [
+            &self.image,
+            &self.potential,
+            &self.size_field,
+            &self.beta_field,
+            &self.mask,
+            &self.labels,
+        ];
+        all.into_iter().flatten().map(PathBuf::as_path)
+    }
+
+    /// The file of the image that gives the frame: the potential or the labels where there is no other.
+    pub fn shown(&self) -> Option<&Path> {
+        let paths = [&self.image, &self.potential, &self.labels];
+        paths.into_iter().flatten().next().map(PathBuf::as_path)
+    }
+}

@@ -1,0 +1,243 @@
+//! Properties of cells from images.
+
+use std::path::PathBuf;
+use std::str::FromStr;
+
+use atomesh::image::Image;
+use atomesh::sample::{SampleOptions, Statistic, sample as sample_cells};
+use atomesh_io::mesh::{AnyMesh, LoadedMesh, MeshData, MeshFormat, Values, write_mesh};
+
+use crate::dimension::Dimension;
+use crate::error::JobError;
+use crate::files::{self, unknown_extension};
+use crate::images::{Beside, ImageRole};
+use crate::mesh_file;
+use crate::options::FrameOptions;
+use crate::session::Session;
+#[cfg(feature = "clap")]
+use crate::values::number_in;
+
+/// A mesh, the images that its cells get properties from, and where it goes.
+#[derive(Clone, Debug, Default, PartialEq)]
+#[cfg_attr(feature = "clap", derive(clap::Args))]
+pub struct SampleRequest {
+    /// Mesh to sample in, in world coordinates: .vtu .vtk .msh .msh2 .npz
+    #[cfg_attr(feature = "clap", arg(value_name = "MESH"))]
+    pub mesh: PathBuf,
+    /// Image to sample, and what it is called. May be given many times. Its frame is that of the options below,
+    /// else of the file if its format has one, else of the mesh if the shapes agree
+    #[cfg_attr(feature = "clap", arg(long, value_name = "NAME=FILE", required = true))]
+    pub image: Vec<NamedImage>,
+    /// What is computed: mean, harmonic, geometric, std, min, max, majority, homogeneity (the share of the majority),
+    /// total (times volume). May be given many times. Default: mean
+    #[cfg_attr(feature = "clap", arg(long, value_name = "STATISTIC", value_parser = statistic(),
+        hide_possible_values = true))]
+    pub statistic: Vec<Statistic>,
+    /// Mesh to write: .vtu .vtk .msh (Gmsh 4.1) .msh2 (Gmsh 2.2) .npz
+    #[cfg_attr(feature = "clap", arg(short, long, value_name = "MESH"))]
+    pub output: PathBuf,
+    /// Value of cells without samples, where totals are 0. Default: NaN
+    #[cfg_attr(feature = "clap", arg(long, value_name = "VALUE", allow_hyphen_values = true,
+        value_parser = number_in(f64::MIN, f64::MAX, "a finite number")))]
+    pub outside: Option<f64>,
+    /// Frame.
+    #[cfg_attr(feature = "clap", command(flatten, next_help_heading = "Frame"))]
+    pub frame: FrameOptions,
+}
+
+#[cfg(feature = "clap")]
+fn statistic() -> impl clap::builder::TypedValueParser<Value = Statistic> {
+    use clap::builder::{PossibleValuesParser, TypedValueParser};
+    PossibleValuesParser::new(Statistic::NAMES).try_map(|name| name.parse())
+}
+
+impl SampleRequest {
+    fn statistics(&self) -> &[Statistic] {
+        if self.statistic.is_empty() { &[Statistic::Mean] } else { &self.statistic }
+    }
+}
+
+/// An image and its name, `NAME=FILE`.
+#[derive(Clone, Debug, PartialEq)]
+pub struct NamedImage {
+    /// What the field is called.
+    pub name: String,
+    /// The image's file.
+    pub path: PathBuf,
+}
+
+impl FromStr for NamedImage {
+    type Err = String;
+
+    fn from_str(text: &str) -> Result<Self, String> {
+        let plain = |c: char| c.is_ascii_alphanumeric() || "_-".contains(c);
+        match text.split_once('=') {
+            Some((name, path))
+                if (1..=48).contains(&name.len())
+                    && name.chars().all(plain)
+                    && !path.is_empty() =>
+            {
+                Ok(Self { name: name.into(), path: path.into() })
+            }
+            _ => Err("expected NAME=FILE, NAME of 1 to 48 letters, digits, '_' or '-'".into()),
+        }
+    }
+}
+
+/// A field in the cells, in the precision in which it is written.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Property {
+    /// The field's name.
+    pub name: String,
+    values: Numbers,
+}
+
+#[derive(Clone, Debug, PartialEq)]
+enum Numbers {
+    Single(Vec<f32>),
+    Double(Vec<f64>),
+}
+
+impl Property {
+    /// In single precision if nothing is lost.
+    fn exact(name: String, values: Vec<f64>) -> Self {
+        let kept = |v: &f64| v.is_nan() || f64::from(*v as f32) == *v;
+        if values.iter().all(kept) {
+            Self::single(name, values)
+        } else {
+            Self::double(name, values)
+        }
+    }
+
+    fn single(name: String, values: Vec<f64>) -> Self {
+        Self { name, values: Numbers::Single(values.into_iter().map(|v| v as f32).collect()) }
+    }
+
+    fn double(name: String, values: Vec<f64>) -> Self {
+        Self { name, values: Numbers::Double(values) }
+    }
+
+    /// The values, one for each cell.
+    pub fn values(&self) -> Values<'_> {
+        match &self.values {
+            Numbers::Single(values) => values.into(),
+            Numbers::Double(values) => values.into(),
+        }
+    }
+}
+
+/// What became of [`sample_file`].
+#[derive(Clone, Debug)]
+pub struct SampleSummary {
+    /// How many cells.
+    pub cell_count: usize,
+    /// The names of their fields.
+    pub fields: Vec<String>,
+}
+
+/// The properties that one image gives to the cells of a mesh; the request says which.
+///
+/// # Errors
+/// [`JobError`] if a sample is of no use for a statistic, or the watch ends the work.
+pub fn sample<const D: usize>(
+    request: &SampleRequest,
+    NamedImage { name, path }: &NamedImage,
+    loaded: &LoadedMesh<D>,
+    image: &Image<D>,
+    session: &mut Session<'_>,
+) -> Result<Vec<Property>, JobError> {
+    let statistics = request.statistics();
+    let options = SampleOptions { statistics, fill: request.outside.unwrap_or(f64::NAN) };
+    let found = sample_cells(&loaded.mesh, image, options, session)
+        .map_err(|e| JobError::from(e).about(path))?;
+    let partial = found.partial_count();
+    let mut properties = Vec::new();
+    for (&statistic, values) in statistics.iter().zip(found.values) {
+        let name = match statistics {
+            [_] => name.clone(),
+            _ => format!("{name}-{statistic}"),
+        };
+        properties.push(match statistic {
+            Statistic::Total => Property::double(name, values),
+            Statistic::Majority => Property::exact(name, values),
+            _ => Property::single(name, values),
+        });
+    }
+    if partial > 0 {
+        let cells = loaded.mesh.cell_count();
+        let text = format!(
+            "{partial} of {cells} cells have samples in a part of them only, or none; {name}-coverage says in which"
+        );
+        session.warn(Some(path), text);
+        properties.push(Property::single(format!("{name}-coverage"), found.coverage));
+    }
+    Ok(properties)
+}
+
+/// Samples all images of a request and writes the mesh with what was found.
+///
+/// # Errors
+/// As [`sample`], and if a file cannot be read or written.
+pub fn sample_file(
+    request: &SampleRequest,
+    session: &mut Session<'_>,
+) -> Result<SampleSummary, JobError> {
+    if MeshFormat::of(&request.output).is_err() {
+        return Err(unknown_extension(&request.output, &MeshFormat::endings()));
+    }
+    let names = || request.image.iter().map(|image| &image.name);
+    if let Some(twice) = names().find(|name| names().filter(|other| other == name).count() > 1) {
+        return Err(JobError::misuse(format!("two images are called {twice}; expected one each")));
+    }
+    files::check([request.output.as_path()], session)?;
+    match mesh_file::read(&request.mesh)? {
+        AnyMesh::Flat(mesh) => run(request, mesh, &Dimension::plane(), session),
+        AnyMesh::Volume(mesh) => run(request, mesh, &Dimension::space(), session),
+    }
+}
+
+fn run<const D: usize>(
+    request: &SampleRequest,
+    mut loaded: LoadedMesh<D>,
+    dimension: &Dimension<D>,
+    session: &mut Session<'_>,
+) -> Result<SampleSummary, JobError> {
+    let mut found = Vec::new();
+    for named in &request.image {
+        let (frame, options) = (loaded.frame.as_ref(), &request.frame);
+        let beside = Beside { frame, options, role: ImageRole::Property };
+        let image = beside.read(&named.path, dimension, session)?;
+        found.extend(sample(request, named, &loaded, &image, session)?);
+    }
+    let old = std::mem::take(&mut loaded.cell_fields).into_iter();
+    let old = old.filter(|field| found.iter().all(|new| new.name != field.name));
+    let mut all: Vec<Property> = old.map(|f| Property::exact(f.name, f.values)).collect();
+    all.extend(found);
+    session.writing(|session| write(request, &loaded, &all, session))?;
+    let fields = all.into_iter().map(|property| property.name).collect();
+    Ok(SampleSummary { cell_count: loaded.mesh.cell_count(), fields })
+}
+
+/// Writes the mesh with its fields.
+fn write<const D: usize>(
+    request: &SampleRequest,
+    loaded: &LoadedMesh<D>,
+    properties: &[Property],
+    session: &mut Session<'_>,
+) -> Result<(), JobError> {
+    let mut data = MeshData::new(&loaded.mesh).with_tags(&loaded.tags);
+    for field in &loaded.point_fields {
+        data = data.with_point_field(&field.name, &field.values).map_err(JobError::content)?;
+    }
+    for field in properties {
+        data = data.with_cell_field(&field.name, field.values()).map_err(JobError::content)?;
+    }
+    if let Some(frame) = &loaded.frame {
+        data = data.with_frame(frame);
+    }
+    if let Some(provenance) = &loaded.provenance {
+        data = data.with_provenance(provenance);
+    }
+    write_mesh(&request.output, &data, session)
+        .map_err(|e| JobError::from(e).about(&request.output))
+}
