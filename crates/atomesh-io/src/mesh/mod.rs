@@ -41,7 +41,7 @@ pub use format::{MeshFormat, UnknownMeshFormat};
 pub use loaded::{AnyMesh, LoadedMesh};
 pub use provenance::Provenance;
 pub use read_error::MeshReadError;
-pub use streamlines::{Streamline, Streamlines, write_streamlines};
+pub use streamlines::{Streamlines, TracedLine, write_streamlines};
 
 use table::Row;
 

@@ -19,7 +19,7 @@ use crate::atomic_file::AtomicFile;
 
 /// A line along which something flows.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Streamline<'a, const D: usize> {
+pub struct TracedLine<'a, const D: usize> {
     /// The places along it, in world coordinates.
     pub points: &'a [[f64; D]],
     /// The time of flight at each of them.
@@ -36,7 +36,7 @@ pub struct Streamline<'a, const D: usize> {
 #[derive(Clone, Copy, Debug)]
 pub struct Streamlines<'a, const D: usize> {
     /// The lines.
-    pub lines: &'a [Streamline<'a, D>],
+    pub lines: &'a [TracedLine<'a, D>],
     /// The frame of the image that the mesh follows.
     pub frame: Option<&'a Frame<D>>,
     /// Where it comes from.
@@ -90,7 +90,7 @@ pub fn write_streamlines<const D: usize>(
     }
     let text = metadata::encode(data.frame, data.provenance);
     let points: Vec<[f64; D]> = lines.iter().flat_map(|line| line.points).copied().collect();
-    let of_points = |values: for<'l> fn(&Streamline<'l, D>) -> &'l [f64]| -> Vec<f64> {
+    let of_points = |values: for<'l> fn(&TracedLine<'l, D>) -> &'l [f64]| -> Vec<f64> {
         lines.iter().flat_map(values).copied().collect()
     };
     let (times, pressures) = (of_points(|line| line.times), of_points(|line| line.pressures));
@@ -110,7 +110,7 @@ pub fn write_streamlines<const D: usize>(
         head.array("Float64", "pressure", "", Column::slice(&pressures, little));
     }
     head.text("</PointData>\n<CellData>\n");
-    let wells = |of: fn(&Streamline<D>) -> Option<u32>| {
+    let wells = |of: fn(&TracedLine<D>) -> Option<u32>| {
         Column::numbers(lines.len(), little, move |i| well(of(&lines[i])))
     };
     head.array("Int32", "from", "", wells(|line| line.from));
@@ -133,7 +133,7 @@ mod tests {
     use super::super::vtu::read::Document;
     use super::*;
 
-    fn written(lines: &[Streamline<2>]) -> Result<Vec<u8>, MeshWriteError> {
+    fn written(lines: &[TracedLine<2>]) -> Result<Vec<u8>, MeshWriteError> {
         let folder = tempfile::tempdir().unwrap();
         let path = folder.path().join("lines.vtp");
         let data = Streamlines { lines, frame: None, provenance: None };
@@ -147,14 +147,14 @@ mod tests {
         let third = 1.0 / 3.0;
         let (long, short) = ([[0.0, third], [1.0, 2.0], [4.0, -1.0]], [[5.0, 5.0], [6.0, 6.0]]);
         let lines = [
-            Streamline {
+            TracedLine {
                 points: &long,
                 times: &[0.0, third, 1e9],
                 pressures: &[3.0, 2.0, third],
                 from: Some(0),
                 to: None,
             },
-            Streamline {
+            TracedLine {
                 points: &short,
                 times: &[0.0, 2.0],
                 pressures: &[1.0, 0.0],
@@ -186,12 +186,12 @@ mod tests {
         let bytes = written(&[]).unwrap();
         assert_eq!(Document::parse(&bytes, "PolyData").unwrap().pieces[0].counts, [0, 0]);
         let line =
-            Streamline { points: &[[0.0; 2]], times: &[0.0], pressures: &[], from: None, to: None };
+            TracedLine { points: &[[0.0; 2]], times: &[0.0], pressures: &[], from: None, to: None };
         written(&[line]).unwrap();
-        let error = written(&[Streamline { times: &[], ..line }]).unwrap_err();
+        let error = written(&[TracedLine { times: &[], ..line }]).unwrap_err();
         let expected = "field \"time_of_flight\" has 0 values for 1 points or cells";
         assert_eq!(error.to_string(), expected);
-        let other = Streamline { pressures: &[1.0], ..line };
+        let other = TracedLine { pressures: &[1.0], ..line };
         let error = written(&[line, other]).unwrap_err();
         assert!(error.to_string().starts_with("field \"pressure\" has 0 values"), "{error}");
     }

@@ -163,7 +163,7 @@ impl<'a, const D: usize> FlowWriting<'a, D> {
     ) -> Result<(), JobError> {
         let well = |number: Option<usize>| number.map(|n| n as u32);
         let lines: Vec<_> = (lines.iter())
-            .map(|line| atomesh_io::mesh::Streamline {
+            .map(|line| atomesh_io::mesh::TracedLine {
                 points: &line.points,
                 times: &line.times,
                 pressures: &[],

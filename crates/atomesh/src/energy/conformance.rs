@@ -338,7 +338,7 @@ impl<const D: usize> Case<D> {
             [("the pairs' energy", a.atomic, b.atomic), ("the image's energy", a.image, b.image)];
         for (quantity, found, expected) in energies {
             let tolerance = share * expected.abs().max(1.0);
-            if !((found - expected).abs() <= tolerance) {
+            if !agree(found, expected, tolerance) {
                 let breach = self.breach(law, quantity, found, expected);
                 return Err(Breach { tolerance, ..breach });
             }
@@ -346,11 +346,16 @@ impl<const D: usize> Case<D> {
         let tolerance = share * steepest(expected);
         let entries = found.gradient.as_flattened().iter().zip(expected.gradient.as_flattened());
         for (v, (&found, &expected)) in entries.enumerate() {
-            if !((found - expected).abs() <= tolerance) {
+            if !agree(found, expected, tolerance) {
                 let breach = self.breach(law, format!("gradient of variable {v}"), found, expected);
                 return Err(Breach { tolerance, ..breach });
             }
         }
         Ok(())
     }
+}
+
+/// Whether two numbers agree to a tolerance; NaN agrees with nothing.
+fn agree(found: f64, expected: f64, tolerance: f64) -> bool {
+    (found - expected).abs() <= tolerance
 }

@@ -59,12 +59,19 @@ fn recall<const D: usize>(cells: &PolyMesh<D>, on: &[(Point<D>, Point<D>)], d: f
     report.recall.unwrap()
 }
 
-/// Points of a plane (2-D: a line) through `through`, a sample apart, at least `inset` inside the box.
-fn on_plane<const D: usize>(
+/// A plane; in the plane a line.
+struct Sheet<const D: usize> {
+    through: Point<D>,
+    normal: Point<D>,
+}
+
+/// Points of a sheet, a sample apart, at least `inset` inside the box.
+fn on_sheet<const D: usize>(
     bounds: &Bounds<D>,
-    (through, normal): (Point<D>, Point<D>),
+    sheet: Sheet<D>,
     inset: f64,
 ) -> Vec<(Point<D>, Point<D>)> {
+    let Sheet { through, normal } = sheet;
     let shape = bounds.max.map(|x| x as usize + 1);
     let samples = (0..shape.iter().product::<usize>())
         .map(|index| crate::image::coordinates(index, shape).map(|i| i as f64));
@@ -97,10 +104,10 @@ fn a_plane_is_followed<const D: usize>(
     let (outcome, cells) = cells(method, &b, options(d));
     assert_sound(&outcome, &cells);
     let bounds = outcome.potential().grid().bounds();
-    let inner = on_plane(&bounds, (through, normal), 1.5 * d);
+    let inner = on_sheet(&bounds, Sheet { through, normal }, 1.5 * d);
     assert_eq!(recall(&cells, &inner, d), 1.0, "{normal:?}");
     // where it meets the box's sides too, but for corners between the last foot and an oblique side
-    let all = recall(&cells, &on_plane(&bounds, (through, normal), 0.0), d);
+    let all = recall(&cells, &on_sheet(&bounds, Sheet { through, normal }, 0.0), d);
     assert!(all > 0.93, "{normal:?}: {all}");
     let report = outcome.mirror_report().unwrap();
     assert!(report.pairs <= report.places && report.shared <= report.pairs, "{report:?}");
@@ -161,7 +168,7 @@ fn crossing_planes_are_followed<const D: usize>(
     let (outcome, cells) = cells(method, &b, options(d));
     assert_sound(&outcome, &cells);
     let bounds = outcome.potential().grid().bounds();
-    let of = |n: usize| on_plane(&bounds, (through, normals[n]), 1.5 * d);
+    let of = |n: usize| on_sheet(&bounds, Sheet { through: through, normal: normals[n] }, 1.5 * d);
     let mut all = of(0);
     all.extend(of(1));
     let found = recall(&cells, &all, d);
@@ -217,7 +224,7 @@ fn where_d_varies_features_are_followed_too() {
     assert_sound(&outcome, &cells);
     let greatest = outcome.distance().greatest();
     assert!(greatest > 2.0 * outcome.distance().least());
-    let on = on_plane(&outcome.potential().grid().bounds(), (through, normal), 8.0);
+    let on = on_sheet(&outcome.potential().grid().bounds(), Sheet { through, normal }, 8.0);
     assert_eq!(recall(&cells, &on, 4.0), 1.0);
 }
 

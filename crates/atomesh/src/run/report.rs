@@ -37,6 +37,15 @@ pub struct VoronoiReport {
     pub alignment: AlignmentReport,
 }
 
+/// What a mesh is measured against.
+struct Measured<'a, const D: usize> {
+    grid: &'a Grid<D>,
+    /// b at the grid's samples.
+    potential: &'a [f32],
+    /// The box that the mesh fills; `None` if it ends at a mask's outline.
+    bounds: Option<Bounds<D>>,
+}
+
 impl MeshReport {
     /// Measures a mesh in lattice coordinates against the samples of b on a grid, for features that
     /// edges of the length `size`, in lattice units, can follow. Fidelity and homogeneity, which need
@@ -51,20 +60,18 @@ impl MeshReport {
         size: WantedSize<'_>,
         watch: &mut dyn Watch,
     ) -> Result<Self, MeasureError> {
-        Self::within(mesh, Some(grid.bounds()), (grid, potential), size, watch)
+        let against = Measured { grid, potential, bounds: Some(grid.bounds()) };
+        Self::within(mesh, against, size, watch)
     }
 
-    /// [`MeshReport::new`] for a mesh that fills `bounds`, or, if `None`, a part of the grid's box.
-    ///
-    /// # Errors
-    /// As [`MeshReport::new`].
-    pub fn within<const D: usize>(
+    /// [`MeshReport::new`] for a mesh that may fill a part of the grid's box.
+    fn within<const D: usize>(
         mesh: &Mesh<D>,
-        bounds: Option<Bounds<D>>,
-        (grid, potential): (&Grid<D>, &[f32]),
+        against: Measured<'_, D>,
         size: WantedSize<'_>,
         watch: &mut dyn Watch,
     ) -> Result<Self, MeasureError> {
+        let Measured { grid, potential, bounds } = against;
         let spread = spread(mesh, size, watch)?;
         let shape = shape(mesh, bounds.as_ref(), watch)?;
         let size = grid.in_samples(size.mean);
@@ -105,8 +112,9 @@ pub(super) fn of_mesh<const D: usize>(
 ) -> Result<MeshReport, RunError> {
     let at_points = Some(outcome.distance_at_points());
     let size = WantedSize { mean: outcome.distance().mean(), at_points };
-    let b = (outcome.potential().grid(), outcome.potential().samples());
-    Ok(MeshReport::within(outcome.mesh(), outcome.bounds(), b, size, watch)?)
+    let (grid, potential) = (outcome.potential().grid(), outcome.potential().samples());
+    let against = Measured { grid, potential, bounds: outcome.bounds() };
+    Ok(MeshReport::within(outcome.mesh(), against, size, watch)?)
 }
 
 /// [`Outcome::fidelity`].

@@ -101,6 +101,29 @@ fn random_image<const D: usize>(random: &mut Pcg64, greatest: usize) -> Image<D>
     })
 }
 
+/// Lattices to choose from; in the plane the last one is refused.
+fn lattices<const D: usize>() -> &'static [LatticeKind] {
+    use LatticeKind::{Bcc, Default, Fcc, Hexagonal, Random};
+    match D {
+        2 => &[Default, Hexagonal, Random, Random, Default, Bcc],
+        _ => &[Default, Fcc, Random, Bcc, Fcc, Random],
+    }
+}
+
+/// Sizes to choose from, about `d`; the last one is refused.
+fn sizes(d: f64) -> [Size; 8] {
+    [
+        Size::Default,
+        Size::Constant(d),
+        Size::Constant(0.5 * d),
+        Size::Constant(9.0 * d),
+        Size::Range { min: d, max: 3.0 * d },
+        Size::Range { min: 1.3 * d, max: 2.0 * d },
+        Size::Constant(1.7 * d),
+        Size::Range { min: 2.0 * d, max: d },
+    ]
+}
+
 fn random_options<const D: usize>(random: &mut Pcg64, image: &Image<D>) -> MeshOptions<D> {
     let frame = image.frame();
     let units = one_of(random, &[Units::Physical, Units::Samples]);
@@ -118,25 +141,6 @@ fn random_options<const D: usize>(random: &mut Pcg64, image: &Image<D>) -> MeshO
     } else {
         Vec::new()
     };
-    let lattices = if D == 2 {
-        [
-            LatticeKind::Default,
-            LatticeKind::Hexagonal,
-            LatticeKind::Random,
-            LatticeKind::Random,
-            LatticeKind::Default,
-            LatticeKind::Bcc,
-        ]
-    } else {
-        [
-            LatticeKind::Default,
-            LatticeKind::Fcc,
-            LatticeKind::Random,
-            LatticeKind::Bcc,
-            LatticeKind::Fcc,
-            LatticeKind::Random,
-        ]
-    };
     MeshOptions {
         features: FeatureOptions {
             features: one_of(random, &features),
@@ -152,22 +156,10 @@ fn random_options<const D: usize>(random: &mut Pcg64, image: &Image<D>) -> MeshO
         kind: MeshKind::default(),
         mirror: true,
         units,
-        size: one_of(
-            random,
-            &[
-                Size::Default,
-                Size::Constant(d),
-                Size::Constant(0.5 * d),
-                Size::Constant(9.0 * d),
-                Size::Range { min: d, max: 3.0 * d },
-                Size::Range { min: 1.3 * d, max: 2.0 * d },
-                Size::Constant(1.7 * d),
-                Size::Range { min: 2.0 * d, max: d },
-            ],
-        ),
+        size: one_of(random, &sizes(d)),
         grade_by: one_of(random, &[GradeBy::Density, GradeBy::Curvature, GradeBy::Distance]),
         image_weight: one_of(random, &[0.0, 0.3, 0.4, 0.5, 0.5, 0.7, 0.9, 1.0, 1.0, 1.1]),
-        lattice: one_of(random, &lattices),
+        lattice: one_of(random, lattices::<D>()),
         spacing_factor: one_of(random, &[0.8, 0.8, 0.6, 1.0]),
         seed_points,
         optimize: OptimizeOptions {
