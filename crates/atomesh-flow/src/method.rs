@@ -19,6 +19,40 @@ use crate::solve::SolveOptions;
 use crate::streamlines::{self, Porosity, Streamline, TraceOptions};
 use crate::two_point;
 
+type SolveDg<const D: usize> = fn(
+    &FlowGrid<D>,
+    &Setting<'_, D>,
+    &DgOptions,
+    &mut dyn Watch,
+) -> Result<DgSolution<D>, FlowError>;
+
+type SolveTwoPoint<const D: usize> = fn(
+    &PolyMesh<D>,
+    &FlowGrid<D>,
+    &Setting<'_, D>,
+    &SolveOptions,
+    &mut dyn Watch,
+) -> Result<Solution<D>, FlowError>;
+
+type Trace<const D: usize> = fn(
+    &FlowGrid<D>,
+    &Setting<'_, D>,
+    &Solution<D>,
+    &TraceOptions<'_>,
+    &mut dyn Watch,
+) -> Result<Vec<Streamline<D>>, FlowError>;
+
+type TimeOfFlight<const D: usize> = fn(
+    &FlowGrid<D>,
+    &Setting<'_, D>,
+    &Solution<D>,
+    Porosity<'_>,
+    &mut dyn Watch,
+) -> Result<Vec<f64>, FlowError>;
+
+type Transmissibilities<const D: usize> =
+    fn(&PolyMesh<D>, &Permeability<D>, &[f64]) -> Result<Vec<f64>, FlowError>;
+
 /// The functions of flow in `D` dimensions; each does what the function that it is named after says.
 #[derive(Clone, Copy)]
 pub struct FlowMethod<const D: usize> {
@@ -29,39 +63,15 @@ pub struct FlowMethod<const D: usize> {
     /// [`Setting::new`].
     pub setting: for<'a> fn(&'a Problem<'a, D>, &FlowGrid<D>) -> Result<Setting<'a, D>, FlowError>,
     /// [`dg::solve`](dg::solve()).
-    pub solve_dg: fn(
-        &FlowGrid<D>,
-        &Setting<'_, D>,
-        &DgOptions,
-        &mut dyn Watch,
-    ) -> Result<DgSolution<D>, FlowError>,
+    pub solve_dg: SolveDg<D>,
     /// [`two_point::solve`](two_point::solve()).
-    pub solve_two_point: fn(
-        &PolyMesh<D>,
-        &FlowGrid<D>,
-        &Setting<'_, D>,
-        &SolveOptions,
-        &mut dyn Watch,
-    ) -> Result<Solution<D>, FlowError>,
+    pub solve_two_point: SolveTwoPoint<D>,
     /// [`two_point::transmissibilities`].
-    pub transmissibilities:
-        fn(&PolyMesh<D>, &Permeability<D>, &[f64]) -> Result<Vec<f64>, FlowError>,
+    pub transmissibilities: Transmissibilities<D>,
     /// [`streamlines::trace`].
-    pub trace: fn(
-        &FlowGrid<D>,
-        &Setting<'_, D>,
-        &Solution<D>,
-        &TraceOptions<'_>,
-        &mut dyn Watch,
-    ) -> Result<Vec<Streamline<D>>, FlowError>,
+    pub trace: Trace<D>,
     /// [`streamlines::time_of_flight`].
-    pub time_of_flight: fn(
-        &FlowGrid<D>,
-        &Setting<'_, D>,
-        &Solution<D>,
-        Porosity<'_>,
-        &mut dyn Watch,
-    ) -> Result<Vec<f64>, FlowError>,
+    pub time_of_flight: TimeOfFlight<D>,
     /// [`Solution::velocities`].
     pub velocities: fn(&Solution<D>, &FlowGrid<D>) -> Vec<Point<D>>,
     /// [`Solution::balance`].
