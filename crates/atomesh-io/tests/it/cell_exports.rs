@@ -290,9 +290,9 @@ fn two_squares_are_written_as_these_lines() {
     let mesh = voronoi(&Delaunay::<2>::new(), &sites, bounds, &mut Silent).unwrap();
     let rock = Rock { permeability: &[2.0, 3.0], multipliers: &[0.5], top: 0.0, thickness: 10.0 };
     let [disv, npf, hfb] = written_without_features(&frame, &mesh, &rock);
-    assert_eq!(disv, include_str!("data/two-squares.disv"));
-    assert_eq!(npf, include_str!("data/two-squares.npf"));
-    assert_eq!(hfb, include_str!("data/two-squares.hfb"));
+    assert_eq!(disv, include_str!("../data/two-squares.disv"));
+    assert_eq!(npf, include_str!("../data/two-squares.npf"));
+    assert_eq!(hfb, include_str!("../data/two-squares.hfb"));
 }
 
 fn written_without_features(frame: &Frame<2>, mesh: &PolyMesh<2>, rock: &Rock) -> [String; 3] {

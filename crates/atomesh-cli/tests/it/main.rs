@@ -1,0 +1,6 @@
+//! Tests of the command and of the documents, one program so that it is compiled and linked once.
+
+mod documents;
+mod licences;
+mod runs;
+mod transcripts;

@@ -1,0 +1,14 @@
+//! Tests of files, one program so that what they share is compiled and linked once.
+
+mod cell_exports;
+mod cell_files;
+mod flow_files;
+mod image_bad_input;
+mod image_round_trip;
+mod mesh_files;
+mod foam_mesh;
+mod quadratic_files;
+mod real_images;
+mod scans;
+mod surfaces;
+mod tags;
