@@ -87,7 +87,7 @@ fn shape(report: &MeshReport, dimension: usize) -> Table {
             "least angle",
             shape.angle_min,
             "°",
-            if angle == "interior" {
+            if flat {
                 "the smallest interior angle of all cells"
             } else {
                 "the smallest dihedral angle of all cells"

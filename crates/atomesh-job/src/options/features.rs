@@ -96,14 +96,7 @@ impl PotentialOptions {
     /// The core's options: what is not given comes from `basis`.
     pub fn feature_options(&self, basis: FeatureOptions) -> FeatureOptions {
         let single = self.features.as_ref().and_then(|mixture| mixture.0.single());
-        let crests = CrestOptions {
-            polarity: self.polarity,
-            scale: self.scale,
-            normal_scale: self.normal_scale,
-            low: self.low,
-            high: self.high,
-            least_length: self.least_length,
-        };
+        let crests = self.crests();
         FeatureOptions {
             features: single.unwrap_or(basis.features),
             edge_operator: self.edge_operator.unwrap_or(basis.edge_operator),
@@ -122,6 +115,18 @@ impl PotentialOptions {
             },
             edges: CrestOptions { scale: self.edge_scale, ..crests }.or(basis.edges),
             ..basis
+        }
+    }
+
+    /// What is given for all kinds of crests.
+    fn crests(&self) -> CrestOptions {
+        CrestOptions {
+            polarity: self.polarity,
+            scale: self.scale,
+            normal_scale: self.normal_scale,
+            low: self.low,
+            high: self.high,
+            least_length: self.least_length,
         }
     }
 
