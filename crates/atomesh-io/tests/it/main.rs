@@ -3,10 +3,10 @@
 mod cell_exports;
 mod cell_files;
 mod flow_files;
+mod foam_mesh;
 mod image_bad_input;
 mod image_round_trip;
 mod mesh_files;
-mod foam_mesh;
 mod quadratic_files;
 mod real_images;
 mod scans;
