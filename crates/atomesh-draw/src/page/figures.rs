@@ -59,7 +59,6 @@ pub(super) fn tables(report: &MeshReport, dimension: usize) -> Vec<Table> {
 fn shape(report: &MeshReport, dimension: usize) -> Table {
     let (shape, spread) = (&report.shape, &report.spread);
     let flat = dimension == 2;
-    let angle = if flat { "the smallest interior angle" } else { "the smallest dihedral angle" };
     let rows = vec![
         figure("points", shape.points, "", "vertices of the mesh"),
         figure("cells", shape.cells, "", if flat { "triangles" } else { "tetrahedra" }),
