@@ -116,6 +116,7 @@ fn print(text: &str) -> ExitCode {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use atomesh_io::image::ImageFormat;
     use atomesh_job::options::RunConfig;
     use clap::Args;
 
@@ -139,6 +140,36 @@ mod tests {
             }
         }
         assert!(names > 20, "{names}");
+    }
+
+    /// The words of a text that are file extensions.
+    fn extensions(text: &str) -> Vec<&str> {
+        let words = text.split([' ', ',', ':', ';']).map(|word| word.trim_end_matches('.'));
+        words.filter(|word| word.starts_with('.')).collect()
+    }
+
+    #[test]
+    fn help_names_all_image_formats_that_are_written() {
+        let command = Cli::command();
+        for (name, option, floats) in [
+            ("mesh", "write_potential", true),
+            ("enhance", "output", true),
+            ("synth", "output", false),
+        ] {
+            let subcommand = command.find_subcommand(name).unwrap();
+            let option = subcommand.get_arguments().find(|a| a.get_id() == option).unwrap();
+            let help = option.get_help().unwrap().to_string();
+            let known = ImageFormat::usual_written_endings(" ", floats);
+            let (stated, known) = (extensions(&help), extensions(&known));
+            assert!(
+                known.iter().all(|ending| stated.contains(ending)),
+                "{name}: {help}; {known:?}"
+            );
+            assert!(
+                stated.iter().all(|ending| known.contains(ending)),
+                "{name}: {help}; {known:?}"
+            );
+        }
     }
 
     /// The defaults of a dimension by option.

@@ -4,13 +4,21 @@ use std::path::{Path, PathBuf};
 
 use super::section::section;
 
+/// The help of the image, with the formats that io's table has.
+#[cfg(feature = "clap")]
+fn image_help() -> String {
+    format!(
+        "Image to mesh: {}, a folder of DICOM slices, or raw samples with --shape and --dtype. Two axes \
+         make triangles, three make tetrahedra",
+        atomesh_io::image::ImageFormat::usual_endings()
+    )
+}
+
 section! {
     /// The files that a mesh is made from.
     pub struct InputOptions {
-        /// Image to mesh: .png .jpg .pgm .tif .npy .nii .nii.gz .nrrd .mha .vti .segy .rsf, a folder of
-        /// DICOM slices, or raw samples with --shape and --dtype. Two axes make triangles, three make
-        /// tetrahedra
-        #[arg(value_name = "IMAGE", help_heading = "Arguments")]
+        /// Image to mesh, in any format that is read. Two axes make triangles, three make tetrahedra
+        #[arg(value_name = "IMAGE", help_heading = "Arguments", help = image_help())]
         pub image: PathBuf,
         /// Image potential b(x) to use as it is, values from -1 (attracts) to 1 (repels), instead of
         /// the features of IMAGE. With both, IMAGE gives the frame and the picture
