@@ -60,7 +60,7 @@ fn the_method_names_public_items() {
             Some(rest) => root().join("crates/atomesh-draw/src").join(rest.trim_matches(':')),
             None => match path.strip_prefix("atomesh_flow") {
                 Some(rest) => root().join("crates/atomesh-flow/src").join(rest.trim_matches(':')),
-                None => root().join("crates/atomesh/src").join(path),
+                None => root().join("crates/atomesh/src").join(path.replace("::", "/")),
             },
         };
         let code =
