@@ -168,7 +168,7 @@ fn crossing_planes_are_followed<const D: usize>(
     let (outcome, cells) = cells(method, &b, options(d));
     assert_sound(&outcome, &cells);
     let bounds = outcome.potential().grid().bounds();
-    let of = |n: usize| on_sheet(&bounds, Sheet { through: through, normal: normals[n] }, 1.5 * d);
+    let of = |n: usize| on_sheet(&bounds, Sheet { through, normal: normals[n] }, 1.5 * d);
     let mut all = of(0);
     all.extend(of(1));
     let found = recall(&cells, &all, d);
