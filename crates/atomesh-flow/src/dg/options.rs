@@ -55,7 +55,7 @@ impl std::str::FromStr for Form {
     }
 }
 
-/// Options of [`solve()`].
+/// Options of [`solve()`](super::solve()).
 #[derive(Clone, Copy, Debug, PartialEq, serde::Serialize, serde::Deserialize)]
 pub struct DgOptions {
     /// The form. Default symmetric interior penalty: stable from order 1, and symmetric.

@@ -14,7 +14,7 @@ pub enum SolveMethod {
     Iterative,
 }
 
-/// Options of [`solve`].
+/// Options of [`solve`](super::solve).
 #[derive(Clone, Copy, Debug, PartialEq, serde::Serialize, serde::Deserialize)]
 pub struct SolveOptions {
     /// The method. Default auto.

@@ -43,7 +43,7 @@ impl Porosity<'_> {
     }
 }
 
-/// Options of [`trace`].
+/// Options of [`trace`](super::trace).
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct TraceOptions<'a> {
     /// How many lines, distributed among wells and boundaries by their inflow. Default 100.

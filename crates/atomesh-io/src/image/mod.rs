@@ -97,7 +97,7 @@ use watched::Watched;
 /// Reads an image from a file, in the format that its name promises.
 ///
 /// Colour becomes luminance by Rec. 601, 0.299 R + 0.587 G + 0.114 B of the values as stored,
-/// rounded; opacity is ignored. NaN is kept: [`Samples::range`] counts it.
+/// rounded; opacity is ignored. NaN is kept: [`Samples::range`](atomesh::image::Samples::range) counts it.
 ///
 /// ```no_run
 /// use atomesh::watch::Silent;

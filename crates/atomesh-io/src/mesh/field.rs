@@ -5,7 +5,7 @@ use super::metadata;
 /// Names that some format gives to other arrays.
 const RESERVED: [&str; 4] = ["points", "cells", "metadata", metadata::NAME];
 
-/// What is wrong with the parts of a [`MeshData`].
+/// What is wrong with the parts of a [`MeshData`](super::MeshData).
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]
 #[non_exhaustive]
 pub enum MeshDataError {

@@ -9,9 +9,9 @@ pub struct Inputs<'a, const D: usize> {
     pub image: &'a Image<D>,
     /// Whether the image is taken as b(x) as it is.
     pub is_potential: bool,
-    /// d(x), in lattice units; goes before [`MeshOptions::size`].
+    /// d(x), in lattice units; goes before [`MeshOptions::size`](super::MeshOptions::size).
     pub size_field: Option<&'a Image<D>>,
-    /// β(x), 0…1; goes before [`MeshOptions::image_weight`].
+    /// β(x), 0…1; goes before [`MeshOptions::image_weight`](super::MeshOptions::image_weight).
     pub weight_field: Option<&'a Image<D>>,
     /// Where to mesh: nonzero is inside, or, of shares within 0…1, at least one half.
     pub mask: Option<&'a Image<D>>,
