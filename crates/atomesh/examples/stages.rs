@@ -44,7 +44,7 @@ fn main() -> Result<(), Box<dyn std::error::Error>> {
     let nearest = editor.atoms().min_by(|(_, p), (_, q)| near(p).total_cmp(&near(q)));
     let (atom, _) = nearest.ok_or("no atoms")?;
     let changes = editor.move_to(atom, [48.0, 48.0])?;
-    println!("{} cells added", changes.cells_added().len());
+    println!("{} atom moved, {} cells added", changes.moves().len(), changes.cells_added().len());
     editor.pin(atom)?;
 
     // the stage as it was, and the edited one, both go on
