@@ -2,7 +2,7 @@
 
 use rayon::prelude::*;
 
-use crate::image::{Frame, Samples};
+use crate::image::Samples;
 use crate::improve::ImproveReport;
 use crate::mesh::Mesh;
 use crate::mirror::MirrorReport;
@@ -90,13 +90,11 @@ fn label<const D: usize>(
     samples: &[i32],
     watch: &mut dyn Watch,
 ) -> Result<Vec<i32>, RunError> {
-    let Parts { options, grid, .. } = run.parts();
-    let frame = Frame::new(grid.shape).and_then(|f| f.with_spacing(grid.step));
-    let frame = frame.expect("a grid has samples and steps above 0");
+    let frame = run.lattice_frame();
     let samples = Samples::I32(samples.to_vec());
     let statistics = SampleOptions::new(&[Statistic::Majority]);
     let found = sample_in_frame(mesh, &frame, &samples, statistics, watch)?;
     let mut labels: Vec<i32> = found.values[0].iter().map(|&label| label as i32).collect();
-    join_islands(mesh, &mut labels, options.least_island);
+    join_islands(mesh, &mut labels, run.options().least_island);
     Ok(labels)
 }

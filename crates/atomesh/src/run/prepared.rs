@@ -150,8 +150,10 @@ impl<const D: usize> Prepared<D> {
     /// [`RunError::OtherBox`] if a point is outside the image's box.
     pub fn with_mesh(&self, mesh: Mesh<D>) -> Result<Connected<D>, RunError> {
         let bounds = self.bounds();
-        if let Some(p) = mesh.points().iter().find(|p| !bounds.contains(p)) {
-            self.check_box(&Bounds { min: *p, max: *p })?;
+        let is_inside =
+            |found: &Bounds<D>| bounds.contains(&found.min) && bounds.contains(&found.max);
+        if let Some(found) = Bounds::of(mesh.points()).filter(|found| !is_inside(found)) {
+            return Err(self.other_box(&found));
         }
         let mut freedom: Vec<u8> = mesh.points().iter().map(|p| bounds.freedom(p)).collect();
         for &point in outline_facets(&mesh, &bounds).as_flattened() {
@@ -177,13 +179,19 @@ impl<const D: usize> Prepared<D> {
     }
 
     fn check_box(&self, found: &Bounds<D>) -> Result<(), RunError> {
-        let expected = self.bounds();
-        if *found == expected {
-            return Ok(());
-        }
-        let texts = [expected, *found].map(|b| format!("{:?} to {:?}", b.min, b.max));
-        let [expected, found] = texts;
-        Err(RunError::OtherBox { expected, found })
+        if *found == self.bounds() { Ok(()) } else { Err(self.other_box(found)) }
+    }
+
+    fn other_box(&self, found: &Bounds<D>) -> RunError {
+        let text = |b: &Bounds<D>| format!("{:?} to {:?}", b.min, b.max);
+        RunError::OtherBox { expected: text(&self.bounds()), found: text(found) }
+    }
+
+    /// Where samples lie in lattice space.
+    pub(super) fn lattice_frame(&self) -> Frame<D> {
+        let grid = &self.0.grid;
+        let frame = Frame::new(grid.shape).and_then(|frame| frame.with_spacing(grid.step));
+        frame.expect("a grid's shape and step were a frame's")
     }
 
     /// Whether pairs of atoms are made where features repel.

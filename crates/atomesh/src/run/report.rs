@@ -1,7 +1,7 @@
 //! The figures of a mesh.
 
 use crate::geometry::Bounds;
-use crate::image::{Frame, Grid, Samples};
+use crate::image::{Grid, Samples};
 use crate::measure::{
     AlignmentOptions, AlignmentReport, FidelityReport, HomogeneityReport, MeasureError,
     PrecisionOptions, SampledPotential, ShapeReport, SpreadReport, WantedSize, alignment,
@@ -123,8 +123,5 @@ pub(super) fn fidelity_of<const D: usize>(
     samples: &Samples,
     watch: &mut dyn Watch,
 ) -> Result<FidelityReport, RunError> {
-    let grid = outcome.potential().grid();
-    let frame = Frame::new(grid.shape).and_then(|frame| frame.with_spacing(grid.step));
-    let frame = frame.expect("a grid's shape and step were a frame's");
-    Ok(fidelity(outcome.mesh(), &frame, samples, watch)?)
+    Ok(fidelity(outcome.mesh(), &outcome.run().lattice_frame(), samples, watch)?)
 }
