@@ -1,7 +1,7 @@
 //! What differs between the plane and space in a job, as values.
 
 use atomesh::image::Image;
-use atomesh::run::Method;
+use atomesh::run::{Method, Tools};
 use atomesh_draw::Drawing;
 use atomesh_flow::FlowMethod;
 use atomesh_io::MeshFiles;
@@ -12,6 +12,8 @@ use atomesh_io::image::AnyImage;
 pub struct Dimension<const D: usize> {
     /// How they are meshed.
     pub method: Method<D>,
+    /// What else is done with them and their meshes.
+    pub tools: &'static Tools<D>,
     /// How flow on their meshes is computed.
     pub flow: FlowMethod<D>,
     /// How files of theirs are written.
@@ -31,6 +33,7 @@ impl Dimension<2> {
     pub fn plane() -> Self {
         Self {
             method: Method::plane(),
+            tools: Tools::plane(),
             flow: FlowMethod::plane(),
             files: MeshFiles::plane(),
             drawing: Drawing::plane(),
@@ -49,6 +52,7 @@ impl Dimension<3> {
     pub fn space() -> Self {
         Self {
             method: Method::space(),
+            tools: Tools::space(),
             flow: FlowMethod::space(),
             files: MeshFiles::space(),
             drawing: Drawing::space(),

@@ -2,7 +2,7 @@
 
 use std::path::PathBuf;
 
-use atomesh::enhance::{Enhanced, FeatureOptions, Mixture, enhance_mixture};
+use atomesh::enhance::{Enhanced, FeatureOptions, Mixture};
 use atomesh::image::{Image, Samples, Units};
 use atomesh::mesh::Mesh;
 use atomesh::watch::{Phase, check};
@@ -73,6 +73,7 @@ pub fn enhance<const D: usize>(
     image: &Image<D>,
     features: &PotentialOptions,
     units: Units,
+    dimension: &Dimension<D>,
     session: &mut Session<'_>,
 ) -> Result<Potential<D>, JobError> {
     let options = features.feature_options(FeatureOptions { units, ..Default::default() });
@@ -80,7 +81,8 @@ pub fn enhance<const D: usize>(
         Some(mixture) => mixture.0.clone(),
         None => Mixture::from(options.features),
     };
-    let Enhanced { values, constant } = enhance_mixture(&mixture, &options, |_| image, session)?;
+    let made = (dimension.tools.enhance_mixture)(&mixture, &options, image, session)?;
+    let Enhanced { values, constant } = made;
     let image = Image::new(*image.frame(), Samples::F32(values)).map_err(JobError::content)?;
     Ok(Potential { image, mixture, is_constant: constant })
 }
@@ -118,7 +120,7 @@ fn run<const D: usize>(
     memory::check_potential(image.samples().len(), "enhance")
         .map_err(|e| e.about(&request.image))?;
     let units = request.units.unwrap_or_default();
-    let potential = enhance(&image, &request.features, units, session)
+    let potential = enhance(&image, &request.features, units, dimension, session)
         .map_err(|e| e.about_content(&request.image))?;
     if potential.is_constant {
         let text = "no features of this kind; the potential is 0";

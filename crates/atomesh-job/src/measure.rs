@@ -4,9 +4,9 @@ use std::path::{Path, PathBuf};
 
 use atomesh::enhance::given_potential;
 use atomesh::image::{Frame, Image, Samples, Units};
-use atomesh::measure::{WantedSize, fidelity, homogeneity};
+use atomesh::measure::WantedSize;
 use atomesh::mesh::Mesh;
-use atomesh::run::{MeshReport, lattice_mesh};
+use atomesh::run::MeshReport;
 use atomesh_draw::Style;
 use atomesh_io::mesh::{AnyMesh, LoadedMesh};
 
@@ -92,10 +92,11 @@ pub fn measure<const D: usize>(
     request: &MeasureRequest,
     loaded: &LoadedMesh<D>,
     against: &Against<D>,
+    dimension: &Dimension<D>,
     session: &mut Session<'_>,
 ) -> Result<MeshReport, JobError> {
     let units = lattice_units(request, loaded);
-    let mesh = lattice_mesh(&loaded.mesh, &against.frame, units);
+    let mesh = (dimension.tools.lattice_mesh)(&loaded.mesh, &against.frame, units);
     let field = loaded.point_field("distance").filter(|_| request.size.is_none());
     let Some(size) = request.size.or_else(|| mean(&mesh, field?)) else {
         let message = "the mesh has no field `distance`; expected --size D";
@@ -103,15 +104,16 @@ pub fn measure<const D: usize>(
     };
     let size = WantedSize { mean: size, at_points: field };
     let grid = against.frame.grid(units);
-    let report = MeshReport::new(&mesh, &grid, &against.potential, size, session);
+    let report = (dimension.tools.measure)(&mesh, &grid, &against.potential, size, session);
     let mut report = report.map_err(|e| JobError::from(e).about(&request.mesh))?;
     if let Some(image) = &against.image {
+        let fidelity = dimension.tools.fidelity;
         let found = fidelity(&loaded.mesh, image.frame(), image.samples(), session);
         let found = found.map_err(|e| JobError::from(e).about_any(request.image.as_deref()))?;
         report.fidelity = Some(found);
     }
     if let Some(labels) = &against.labels {
-        let found = homogeneity(&loaded.mesh, labels, session);
+        let found = (dimension.tools.homogeneity)(&loaded.mesh, labels, session);
         let found = found.map_err(|e| JobError::from(e).about_any(request.labels.as_deref()))?;
         report.homogeneity = Some(found);
     }
@@ -158,7 +160,7 @@ fn run<const D: usize>(
     let labels = request.labels.as_deref().map(&mut read).transpose()?;
     let against = Against::potential(potential).map_err(|e| e.about(&request.potential))?;
     let against = Against { image, labels, ..against };
-    let report = measure(request, loaded, &against, session)?;
+    let report = measure(request, loaded, &against, dimension, session)?;
     if let Some(path) = &request.html {
         let page = Page { request, loaded, against: &against };
         session.writing(|_| page.write(path, &report, dimension))?;
@@ -191,7 +193,7 @@ impl<const D: usize> Page<'_, D> {
                 &potential
             }
         };
-        let mesh = lattice_mesh(&loaded.mesh, image.frame(), Units::Samples);
+        let mesh = (dimension.tools.lattice_mesh)(&loaded.mesh, image.frame(), Units::Samples);
         let file = request.image.as_ref().unwrap_or(&request.potential);
         let z_up = is_z_up(Some(file), image.frame());
         let style = Style { units: lattice_units(request, loaded), z_up, ..Style::default() };

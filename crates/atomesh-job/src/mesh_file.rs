@@ -5,7 +5,7 @@ use std::path::Path;
 use atomesh::geometry::Bounds;
 use atomesh::image::{Frame, Units};
 use atomesh::mesh::{Mesh, Tags};
-use atomesh::run::{lattice_mesh, sides};
+use atomesh::run::Tools;
 use atomesh_io::mesh::{AnyMesh, MeshFormat, MeshReadError, Provenance, read_mesh};
 
 use crate::error::JobError;
@@ -39,9 +39,14 @@ pub(crate) fn units(provenance: Option<&Provenance>) -> Option<Units> {
 }
 
 /// The sides of the image's box, or of the mesh's own where the image is not known.
-pub(crate) fn own_sides<const D: usize>(mesh: &Mesh<D>, frame: Option<&Frame<D>>) -> Tags<D> {
+pub(crate) fn own_sides<const D: usize>(
+    mesh: &Mesh<D>,
+    frame: Option<&Frame<D>>,
+    tools: &Tools<D>,
+) -> Tags<D> {
+    let sides = tools.sides;
     if let Some(frame) = frame {
-        let lattice = lattice_mesh(mesh, frame, Units::Physical);
+        let lattice = (tools.lattice_mesh)(mesh, frame, Units::Physical);
         return sides(&lattice, &frame.grid(Units::Physical).bounds(), frame.is_mirrored());
     }
     let bounds = Bounds::of(mesh.points());

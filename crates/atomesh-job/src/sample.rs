@@ -4,7 +4,7 @@ use std::path::PathBuf;
 use std::str::FromStr;
 
 use atomesh::image::Image;
-use atomesh::sample::{SampleOptions, Statistic, sample as sample_cells};
+use atomesh::sample::{SampleOptions, Statistic};
 use atomesh_io::mesh::{AnyMesh, LoadedMesh, MeshData, MeshFormat, Values};
 
 use crate::dimension::Dimension;
@@ -144,11 +144,12 @@ pub fn sample<const D: usize>(
     NamedImage { name, path }: &NamedImage,
     loaded: &LoadedMesh<D>,
     image: &Image<D>,
+    dimension: &Dimension<D>,
     session: &mut Session<'_>,
 ) -> Result<Vec<Property>, JobError> {
     let statistics = request.statistics();
     let options = SampleOptions { statistics, fill: request.outside.unwrap_or(f64::NAN) };
-    let found = sample_cells(&loaded.mesh, image, options, session)
+    let found = (dimension.tools.sample)(&loaded.mesh, image, options, session)
         .map_err(|e| JobError::from(e).about(path))?;
     let partial = found.partial_count();
     let mut properties = Vec::new();
@@ -207,7 +208,7 @@ fn run<const D: usize>(
         let (frame, options) = (loaded.frame.as_ref(), &request.frame);
         let beside = Beside { frame, options, role: ImageRole::Property };
         let image = beside.read(&named.path, dimension, session)?;
-        found.extend(sample(request, named, &loaded, &image, session)?);
+        found.extend(sample(request, named, &loaded, &image, dimension, session)?);
     }
     let old = std::mem::take(&mut loaded.cell_fields).into_iter();
     let old = old.filter(|field| found.iter().all(|new| new.name != field.name));

@@ -4,13 +4,10 @@ mod write;
 
 use std::path::{Path, PathBuf};
 
-use atomesh::enhance::{FeatureOptions, enhance, given_potential};
-use atomesh::features::{
-    FacetField, FacetTest, FeatureFacetOptions, FeatureSet, Selection, find_features,
-};
-use atomesh::fields::ScalarField;
+use atomesh::enhance::{FeatureOptions, given_potential};
+use atomesh::features::{FacetField, FacetTest, FeatureFacetOptions, FeatureSet, Selection};
 use atomesh::image::{Image, Units};
-use atomesh::run::{MeshOptions, lattice_mesh};
+use atomesh::run::MeshOptions;
 use atomesh_io::mesh::{AnyMesh, LoadedMesh};
 
 use crate::dimension::Dimension;
@@ -154,10 +151,11 @@ pub fn features<const D: usize>(
     request: &FeaturesRequest,
     loaded: &LoadedMesh<D>,
     image: Option<Image<D>>,
+    dimension: &Dimension<D>,
     session: &mut Session<'_>,
 ) -> Result<FeatureSet<D>, JobError> {
     let field = match image {
-        Some(image) => along(request, loaded, image, session)?,
+        Some(image) => along(request, loaded, image, dimension, session)?,
         None => {
             let Some(values) = loaded.point_field("potential") else {
                 let message =
@@ -168,7 +166,7 @@ pub fn features<const D: usize>(
                 .map_err(|e| JobError::from(e).about(&request.mesh))?
         }
     };
-    Ok(find_features(&loaded.mesh, &field, &request.facet_options())?)
+    Ok((dimension.tools.find_features)(&loaded.mesh, &field, &request.facet_options())?)
 }
 
 /// b along the facets, from an image or potential.
@@ -176,6 +174,7 @@ fn along<const D: usize>(
     request: &FeaturesRequest,
     loaded: &LoadedMesh<D>,
     image: Image<D>,
+    dimension: &Dimension<D>,
     session: &mut Session<'_>,
 ) -> Result<FacetField<D>, JobError> {
     let path = request.source().unwrap_or(&request.mesh);
@@ -188,14 +187,14 @@ fn along<const D: usize>(
         (frame, given_potential(samples).map_err(|e| JobError::content(e).about(path))?)
     } else {
         let options = FeatureOptions { units, ..options.features };
-        let enhanced = enhance(&image, &options, session);
+        let enhanced = (dimension.tools.enhance)(&image, &options, session);
         let enhanced = enhanced.map_err(|e| JobError::from(e).about_content(path))?;
         (*image.frame(), enhanced.values)
     };
-    let potential = ScalarField::potential(frame.grid(units), samples, options.interpolation);
+    let potential = (dimension.tools.potential)(frame.grid(units), samples, options.interpolation);
     let potential = potential.map_err(|e| JobError::content(e).about(path))?;
-    let mesh = lattice_mesh(&loaded.mesh, &frame, units);
-    Ok(FacetField::along(&mesh, &potential, session)?)
+    let mesh = (dimension.tools.lattice_mesh)(&loaded.mesh, &frame, units);
+    Ok((dimension.tools.field_along)(&mesh, &potential, session)?)
 }
 
 /// Finds features of files, and writes them.
@@ -228,7 +227,7 @@ fn run<const D: usize>(
         None => None,
     };
     let from_points = image.is_none();
-    let found = features(request, loaded, image, session)?;
+    let found = features(request, loaded, image, dimension, session)?;
     session.writing(|session| files.write(loaded, &found, dimension, session))?;
     let facets = found.features.iter().map(|feature| feature.facets.len()).sum();
     let (features, selection) = (found.features.len(), found.selection);

@@ -4,6 +4,7 @@ use std::path::Path;
 
 use atomesh::features::FeatureSet;
 use atomesh::mesh::{Tags, is_feature_name};
+use atomesh::run::Tools;
 use atomesh_io::mesh::{LoadedMesh, MeshData, MeshFormat};
 use atomesh_io::surface::SurfaceFormat;
 use serde_json::json;
@@ -78,7 +79,7 @@ impl<'a> FeatureFiles<'a> {
             written.map_err(|e| JobError::from(e).about(path))?;
         }
         if let Some(path) = &self.request.mesh_output {
-            let tags = self.tags(loaded, found)?;
+            let tags = self.tags(loaded, found, dimension.tools)?;
             let data = tagged(loaded, &tags);
             let format = MeshFormat::of(path).map_err(JobError::misuse)?;
             let written = (dimension.files.mesh)(path, format, &data, session);
@@ -100,6 +101,7 @@ impl<'a> FeatureFiles<'a> {
         &self,
         loaded: &LoadedMesh<D>,
         found: &FeatureSet<D>,
+        tools: &Tools<D>,
     ) -> Result<Tags<D>, JobError> {
         let mesh = &loaded.mesh;
         let groups = loaded.tags.facet_groups();
@@ -112,7 +114,7 @@ impl<'a> FeatureFiles<'a> {
         };
         let mut tags = Tags::new(mesh, kept, regions).map_err(JobError::content)?;
         if !has_groups {
-            let sides = mesh_file::own_sides(mesh, loaded.frame.as_ref());
+            let sides = mesh_file::own_sides(mesh, loaded.frame.as_ref(), tools);
             tags = sides.merge(tags).map_err(JobError::content)?;
         }
         tags.merge(found.tags(mesh).map_err(JobError::content)?).map_err(JobError::content)

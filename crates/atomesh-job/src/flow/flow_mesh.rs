@@ -5,7 +5,7 @@ use std::path::Path;
 use atomesh::features::{FeatureFaces, FeatureFacetOptions};
 use atomesh::image::{Frame, Image, Units};
 use atomesh::mesh::{Mesh, PolyMesh, Tags};
-use atomesh::run::{Outcome, Prepared};
+use atomesh::run::{Outcome, Prepared, Tools};
 use atomesh_flow::{FlowGrid, FlowMethod};
 use atomesh_io::mesh::cells::{AnyCells, CellReadError, LoadedCells, read_cells};
 use atomesh_io::mesh::{AnyMesh, LoadedMesh, OwnedField, Provenance};
@@ -80,8 +80,12 @@ pub(super) fn read(path: &Path, session: &mut Session<'_>) -> Result<AnyFlowMesh
         true => Err(JobError::misuse("no list of connections of Voronoi cells").about(path)),
     };
     let refusal = match simplices {
-        Ok(AnyMesh::Flat(mesh)) => return Ok(AnyFlowMesh::Flat(FlowMesh::of_mesh(mesh)?)),
-        Ok(AnyMesh::Volume(mesh)) => return Ok(AnyFlowMesh::Volume(FlowMesh::of_mesh(mesh)?)),
+        Ok(AnyMesh::Flat(mesh)) => {
+            return Ok(AnyFlowMesh::Flat(FlowMesh::of_mesh(mesh, Tools::plane())?));
+        }
+        Ok(AnyMesh::Volume(mesh)) => {
+            return Ok(AnyFlowMesh::Volume(FlowMesh::of_mesh(mesh, Tools::space())?));
+        }
         Err(refusal) => refusal,
     };
     match read_cells(path, session) {
@@ -112,13 +116,13 @@ impl<const D: usize> FlowMesh<D> {
     ///
     /// # Errors
     /// [`JobError`] if the file's groups of facets do not go with the sides.
-    pub fn of_mesh(loaded: LoadedMesh<D>) -> Result<Self, JobError> {
+    pub fn of_mesh(loaded: LoadedMesh<D>, tools: &Tools<D>) -> Result<Self, JobError> {
         let LoadedMesh { mesh, tags, cell_fields, frame, provenance, .. } = loaded;
         let mesh = mesh_file::oriented(mesh);
         let tags = match tags.facet_group("xmin") {
             Some(_) => tags,
             None => {
-                let sides = mesh_file::own_sides(&mesh, frame.as_ref());
+                let sides = mesh_file::own_sides(&mesh, frame.as_ref(), tools);
                 sides.merge(tags).map_err(JobError::content)?
             }
         };

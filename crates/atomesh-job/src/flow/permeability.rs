@@ -1,9 +1,6 @@
 //! The permeability of a mesh's cells.
 
-use std::path::Path;
-
-use atomesh::image::Image;
-use atomesh::sample::{CellSurfaces, SampleOptions, Statistic, sample};
+use atomesh::sample::SampleOptions;
 use atomesh_flow::Permeability;
 
 use super::flow_mesh::{FlowMesh, FlowMeshCells};
@@ -32,23 +29,14 @@ pub(super) fn permeability<const D: usize>(
     let beside = Beside { frame: mesh.frame.as_ref(), options: frame, role: ImageRole::Property };
     let image = beside.read(path, dimension, session)?;
     let statistic = options.permeability_mean.parse().map_err(JobError::misuse)?;
-    let means = match &mesh.cells {
-        FlowMeshCells::Voronoi { cells, .. } => means(&**cells, &image, statistic, path, session)?,
-        FlowMeshCells::Simplices { mesh, .. } => means(mesh, &image, statistic, path, session)?,
-    };
-    Ok(Permeability::Cells(means))
-}
-
-/// The mean of the samples in each cell.
-fn means<const D: usize>(
-    cells: &impl CellSurfaces<D>,
-    image: &Image<D>,
-    statistic: Statistic,
-    path: &Path,
-    session: &mut Session<'_>,
-) -> Result<Vec<f64>, JobError> {
     let statistics = [statistic];
-    let found = sample(cells, image, SampleOptions::new(&statistics), session);
+    let (tools, wanted) = (dimension.tools, SampleOptions::new(&statistics));
+    let found = match &mesh.cells {
+        FlowMeshCells::Voronoi { cells, .. } => {
+            (tools.sample_cells)(cells, &image, wanted, session)
+        }
+        FlowMeshCells::Simplices { mesh, .. } => (tools.sample)(mesh, &image, wanted, session),
+    };
     let mut found = found.map_err(|e| JobError::from(e).about(path))?;
-    Ok(found.values.swap_remove(0))
+    Ok(Permeability::Cells(found.values.swap_remove(0)))
 }

@@ -3,9 +3,9 @@
 use std::path::Path;
 
 use atomesh::image::Image;
-use atomesh::measure::{AlignmentReport, ShapeReport, shape};
+use atomesh::measure::{AlignmentReport, ShapeReport};
 use atomesh::mesh::PolyReport;
-use atomesh::run::{MeshReport, Outcome, RunError, VoronoiReport};
+use atomesh::run::{MeshReport, Outcome, RunError, Tools, VoronoiReport};
 use atomesh_draw::Style;
 use serde_json::{Map, Value, json};
 
@@ -50,11 +50,12 @@ impl Figures {
         run: &RunConfig,
         outcome: &Outcome<D>,
         measured: Measured<'_, D>,
+        tools: &Tools<D>,
         session: &mut Session<'_>,
     ) -> Result<Self, JobError> {
         let found = match outcome.cells() {
-            Some(_) => Self::of_voronoi(outcome, measured, session),
-            None => Self::of_simplices(outcome, measured, session),
+            Some(_) => Self::of_voronoi(outcome, measured, tools, session),
+            None => Self::of_simplices(outcome, measured, tools, session),
         };
         found.map_err(|e| refusal(run, e))
     }
@@ -62,12 +63,14 @@ impl Figures {
     fn of_simplices<const D: usize>(
         outcome: &Outcome<D>,
         measured: Measured<'_, D>,
+        tools: &Tools<D>,
         session: &mut Session<'_>,
     ) -> Result<Self, RunError> {
         match measured {
             Measured::Nothing => Ok(Self::default()),
             Measured::Shape => {
-                let shape = shape(outcome.mesh(), outcome.bounds().as_ref(), session);
+                let bounds = outcome.bounds();
+                let shape = (tools.shape)(outcome.mesh(), bounds.as_ref(), session);
                 Ok(Self { shape: Some(shape.map_err(RunError::Measure)?), ..Self::default() })
             }
             Measured::All(image) => {
@@ -82,13 +85,14 @@ impl Figures {
     fn of_voronoi<const D: usize>(
         outcome: &Outcome<D>,
         measured: Measured<'_, D>,
+        tools: &Tools<D>,
         session: &mut Session<'_>,
     ) -> Result<Self, RunError> {
         let (voronoi, voronoi_alignment) = match measured {
             Measured::Nothing => (None, None),
             Measured::Shape => {
                 let bounds = outcome.potential().grid().bounds();
-                (outcome.cells().map(|cells| PolyReport::new(cells, &bounds)), None)
+                (outcome.cells().map(|cells| (tools.cells_shape)(cells, &bounds)), None)
             }
             Measured::All(_) => {
                 let report = outcome.cells_report(session)?;

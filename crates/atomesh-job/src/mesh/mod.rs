@@ -187,7 +187,7 @@ impl FileRun<'_> {
             _ if self.options.measures_shape => Measured::Shape,
             _ => Measured::Nothing,
         };
-        let figures = Figures::new(run, &outcome, measured, session)?;
+        let figures = Figures::new(run, &outcome, measured, dimension.tools, session)?;
         let writing = Writing { run, outputs, outcome: &outcome, dimension };
         let tagged = session.writing(|session| -> Result<_, JobError> {
             let tagged = writing.write(image.as_ref(), session)?;

@@ -3,10 +3,10 @@
 //! Whoever is generic over D and calls the stages through these tables compiles none of the work again: it was
 //! compiled once, with this crate.
 
-use crate::features::{FeatureFacetOptions, FeatureSet};
+use crate::features::{FeatureFaces, FeatureFacetOptions, FeatureSet};
 use crate::image::Samples;
 use crate::measure::FidelityReport;
-use crate::mesh::{Mesh, Quadratic, Tags, TagsError};
+use crate::mesh::{Mesh, PolyMesh, Quadratic, Tags, TagsError};
 use crate::watch::Watch;
 
 use super::connected::{self, Connected};
@@ -48,6 +48,13 @@ pub(super) struct Stages<const D: usize> {
     pub cells_report: fn(&Outcome<D>, &mut dyn Watch) -> Made<Option<VoronoiReport>>,
     pub fidelity: fn(&Outcome<D>, &Samples, &mut dyn Watch) -> Made<FidelityReport>,
     pub features: Features<D>,
+    pub world_mesh: fn(&Outcome<D>) -> Mesh<D>,
+    pub sample_mesh: fn(&Outcome<D>) -> Mesh<D>,
+    pub world_cells: fn(&Outcome<D>) -> Option<PolyMesh<D>>,
+    pub sample_cells: fn(&Outcome<D>) -> Option<PolyMesh<D>>,
+    pub distance_at_samples: fn(&Outcome<D>) -> Vec<f32>,
+    pub cell_features: fn(&Outcome<D>, f64) -> Option<FeatureFaces>,
+    pub feature_density: fn(&Outcome<D>) -> Vec<f32>,
     pub tags: fn(&Outcome<D>) -> Result<Tags<D>, TagsError>,
     pub quadratic: fn(&Outcome<D>) -> Quadratic<D>,
 }
@@ -67,6 +74,13 @@ impl<const D: usize> Stages<D> {
             cells_report: report::of_cells,
             fidelity: report::fidelity_of,
             features: outcome::features_of,
+            world_mesh: outcome::world_mesh_of,
+            sample_mesh: outcome::sample_mesh_of,
+            world_cells: outcome::world_cells_of,
+            sample_cells: outcome::sample_cells_of,
+            distance_at_samples: outcome::distance_at_samples_of,
+            cell_features: outcome::cell_features_of,
+            feature_density: outcome::feature_density_of,
             tags: outcome::tags_of,
             quadratic: outcome::quadratic_of,
         }

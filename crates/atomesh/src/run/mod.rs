@@ -52,6 +52,7 @@ mod settled;
 mod stage_tests;
 #[cfg(test)]
 mod tests;
+mod tools;
 
 pub use connected::Connected;
 pub use divided::Divided;
@@ -66,6 +67,7 @@ pub use outcome::{Outcome, lattice_mesh, sides};
 pub use prepared::Prepared;
 pub use report::{MeshReport, VoronoiReport};
 pub use settled::Settled;
+pub use tools::Tools;
 
 use crate::watch::Watch;
 

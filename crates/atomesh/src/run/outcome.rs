@@ -57,12 +57,12 @@ impl<const D: usize> Outcome<D> {
 
     /// The mesh in world coordinates, cells of positive orientation.
     pub fn world_mesh(&self) -> Mesh<D> {
-        place(&self.mesh, self.frame(), self.units())
+        (self.stages().world_mesh)(self)
     }
 
     /// The mesh in sample coordinates: what drawing and alignment work in.
     pub fn sample_mesh(&self) -> Mesh<D> {
-        in_samples(&self.mesh, self.potential().grid())
+        (self.stages().sample_mesh)(self)
     }
 
     /// The facets that follow features, in world coordinates; `world` is [`Outcome::world_mesh`].
@@ -86,16 +86,12 @@ impl<const D: usize> Outcome<D> {
     /// The Voronoi cells in world coordinates. Where the lattice is in samples and their steps differ, the
     /// world's cells are convex still, but their faces are not at right angles to the lines between sites.
     pub fn world_cells(&self) -> Option<PolyMesh<D>> {
-        let (frame, units) = (self.frame(), self.units());
-        let to = |p: &Point<D>| frame.lattice_to_world(units, p);
-        self.cells.as_ref().map(|cells| cells.moved(frame.is_mirrored(), to))
+        (self.stages().world_cells)(self)
     }
 
     /// The Voronoi cells in sample coordinates.
     pub fn sample_cells(&self) -> Option<PolyMesh<D>> {
-        let step = self.potential().grid().step;
-        let to = |p: &Point<D>| std::array::from_fn(|k| p[k] / step[k]);
-        self.cells.as_ref().map(|cells| cells.moved(false, to))
+        (self.stages().sample_cells)(self)
     }
 
     /// The faces of the Voronoi cells that lie on features: |b| is 0.2 or more along them in the mean, in
@@ -106,9 +102,7 @@ impl<const D: usize> Outcome<D> {
 
     /// The same with another value for the least mean of |b| along a face, above 0.
     pub fn cell_features_from(&self, least: f64) -> Option<FeatureFaces> {
-        let least_area = LEAST_FEATURE * self.distance().mean().powi(D as i32 - 1);
-        let of = |cells| feature_faces(cells, self.potential(), least, least_area);
-        self.cells.as_ref().map(of)
+        (self.stages().cell_features)(self, least)
     }
 
     /// Measures the Voronoi cells, if they were asked for.
@@ -141,30 +135,13 @@ impl<const D: usize> Outcome<D> {
 
     /// d at the image's samples, x fastest.
     pub fn distance_at_samples(&self) -> Vec<f32> {
-        let grid = self.potential().grid();
-        let row = grid.shape[0];
-        let mut values = vec![0.0; grid.sample_count()];
-        values.par_chunks_mut(row).enumerate().for_each(|(r, values)| {
-            let mut rest = r;
-            let mut p = [0.0; D];
-            for k in 1..D {
-                p[k] = (rest % grid.shape[k]) as f64 * grid.step[k];
-                rest /= grid.shape[k];
-            }
-            for (i, value) in values.iter_mut().enumerate() {
-                p[0] = i as f64 * grid.step[0];
-                *value = self.distance().at(&p) as f32;
-            }
-        });
-        values
+        (self.stages().distance_at_samples)(self)
     }
 
     /// How many features there are around each of the image's samples, x fastest: |b| smoothed by the greatest
     /// nominal distance, 0…1.
     pub fn feature_density(&self) -> Vec<f32> {
-        let smooth = self.distance().greatest();
-        feature_density(self.potential().grid(), self.potential().samples(), smooth)
-            .expect("a potential has a sample for each of its grid, and d is a length")
+        (self.stages().feature_density)(self)
     }
 
     /// The image's frame.
@@ -267,6 +244,67 @@ pub(super) fn features_of<const D: usize>(
 ) -> Result<FeatureSet<D>, RunError> {
     let field = FacetField::along(outcome.mesh(), outcome.potential(), watch)?;
     Ok(find_features(world, &field, options)?)
+}
+
+/// [`Outcome::world_mesh`].
+pub(super) fn world_mesh_of<const D: usize>(outcome: &Outcome<D>) -> Mesh<D> {
+    place(&outcome.mesh, outcome.frame(), outcome.units())
+}
+
+/// [`Outcome::sample_mesh`].
+pub(super) fn sample_mesh_of<const D: usize>(outcome: &Outcome<D>) -> Mesh<D> {
+    in_samples(&outcome.mesh, outcome.potential().grid())
+}
+
+/// [`Outcome::world_cells`].
+pub(super) fn world_cells_of<const D: usize>(outcome: &Outcome<D>) -> Option<PolyMesh<D>> {
+    let (frame, units) = (outcome.frame(), outcome.units());
+    let to = |p: &Point<D>| frame.lattice_to_world(units, p);
+    outcome.cells.as_ref().map(|cells| cells.moved(frame.is_mirrored(), to))
+}
+
+/// [`Outcome::sample_cells`].
+pub(super) fn sample_cells_of<const D: usize>(outcome: &Outcome<D>) -> Option<PolyMesh<D>> {
+    let step = outcome.potential().grid().step;
+    let to = |p: &Point<D>| std::array::from_fn(|k| p[k] / step[k]);
+    outcome.cells.as_ref().map(|cells| cells.moved(false, to))
+}
+
+/// [`Outcome::distance_at_samples`].
+pub(super) fn distance_at_samples_of<const D: usize>(outcome: &Outcome<D>) -> Vec<f32> {
+    let grid = outcome.potential().grid();
+    let row = grid.shape[0];
+    let mut values = vec![0.0; grid.sample_count()];
+    values.par_chunks_mut(row).enumerate().for_each(|(r, values)| {
+        let mut rest = r;
+        let mut p = [0.0; D];
+        for k in 1..D {
+            p[k] = (rest % grid.shape[k]) as f64 * grid.step[k];
+            rest /= grid.shape[k];
+        }
+        for (i, value) in values.iter_mut().enumerate() {
+            p[0] = i as f64 * grid.step[0];
+            *value = outcome.distance().at(&p) as f32;
+        }
+    });
+    values
+}
+
+/// [`Outcome::cell_features_from`].
+pub(super) fn cell_features_of<const D: usize>(
+    outcome: &Outcome<D>,
+    least: f64,
+) -> Option<FeatureFaces> {
+    let least_area = LEAST_FEATURE * outcome.distance().mean().powi(D as i32 - 1);
+    let of = |cells| feature_faces(cells, outcome.potential(), least, least_area);
+    outcome.cells.as_ref().map(of)
+}
+
+/// [`Outcome::feature_density`].
+pub(super) fn feature_density_of<const D: usize>(outcome: &Outcome<D>) -> Vec<f32> {
+    let (potential, smooth) = (outcome.potential(), outcome.distance().greatest());
+    feature_density(potential.grid(), potential.samples(), smooth)
+        .expect("a potential has a sample for each of its grid, and d is a length")
 }
 
 /// [`Outcome::tags`].

@@ -12,7 +12,7 @@ use atomesh::features::FeatureFaces;
 use atomesh::geometry::{Bounds, Point};
 use atomesh::image::{Frame, Units};
 use atomesh::mesh::{Delaunay, PolyMesh};
-use atomesh::voronoi::voronoi;
+use atomesh::run::Tools;
 use atomesh::watch::Watch;
 
 use super::super::field::OwnedField;
@@ -60,15 +60,16 @@ pub fn read_cells(path: &Path, watch: &mut dyn Watch) -> Result<AnyCells, CellRe
         _ => return Err(CellReadError::Format),
     };
     if raw.dimension == 2 {
-        Ok(AnyCells::Flat(rebuild(&Delaunay::<2>::new(), raw, watch)?))
+        Ok(AnyCells::Flat(rebuild(&Delaunay::<2>::new(), Tools::plane(), raw, watch)?))
     } else {
-        Ok(AnyCells::Volume(rebuild(&Delaunay::<3>::new(), raw, watch)?))
+        Ok(AnyCells::Volume(rebuild(&Delaunay::<3>::new(), Tools::space(), raw, watch)?))
     }
 }
 
 /// The cells of the sites, in the box of the frame.
 fn rebuild<const D: usize>(
     delaunay: &Delaunay<D>,
+    tools: &Tools<D>,
     raw: RawCells,
     watch: &mut dyn Watch,
 ) -> Result<LoadedCells<D>, CellReadError> {
@@ -86,7 +87,7 @@ fn rebuild<const D: usize>(
         on_sides(frame.world_to_lattice(units, &world), &bounds)
     };
     let sites: Vec<Point<D>> = raw.sites.iter().map(site).collect();
-    let cells = voronoi(delaunay, &sites, bounds, watch)?;
+    let cells = (tools.voronoi)(delaunay, &sites, bounds, watch)?;
     let mesh = cells.moved(frame.is_mirrored(), |p| frame.lattice_to_world(units, p));
     let mean = mesh.measure() / mesh.cell_count() as f64;
     for (cell, (&found, &expected)) in raw.volumes.iter().zip(mesh.measures()).enumerate() {
