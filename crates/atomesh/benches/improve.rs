@@ -5,7 +5,7 @@ use atomesh::fields::FieldsView;
 use atomesh::fields::NominalDistance;
 use atomesh::fields::{ImageWeight, Interpolation, ScalarField};
 use atomesh::image::Units;
-use atomesh::improve::{Align, ImproveOptions, Improver, SpaceImprover};
+use atomesh::improve::{Align, Held, ImproveOptions, Improver, SpaceImprover};
 use atomesh::lattice::{Crystal, GrowOptions, grow};
 use atomesh::mesh::Delaunay;
 use atomesh::optimize::{OptimizeOptions, optimize};
@@ -36,8 +36,15 @@ fn benches(criterion: &mut Criterion) {
         let options = ImproveOptions { align, ..ImproveOptions::for_dimension(3) };
         let name = format!("{align:?}, {} cells", mesh.cell_count());
         group.bench_function(name, |bencher| {
-            let improve =
-                || SpaceImprover.improve(mesh.clone(), &freedom, fields, &options, &mut Silent);
+            let improve = || {
+                SpaceImprover.improve(
+                    mesh.clone(),
+                    Held { freedom: &freedom, facets: &[] },
+                    fields,
+                    &options,
+                    &mut Silent,
+                )
+            };
             bencher.iter(improve);
         });
     }

@@ -20,6 +20,7 @@ pub mod region;
 pub mod lattice;
 pub mod optimize;
 pub mod mirror;
+pub mod conform;
 pub mod improve;
 pub mod edit;
 pub mod features;

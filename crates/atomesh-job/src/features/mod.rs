@@ -5,8 +5,11 @@ mod write;
 use std::path::{Path, PathBuf};
 
 use atomesh::enhance::{FeatureOptions, given_potential};
-use atomesh::features::{FacetField, FacetTest, FeatureFacetOptions, FeatureSet, Selection};
+use atomesh::features::{
+    FacetField, FacetTest, FacetsOfFeature, FeatureFacetOptions, FeatureSet, Selection,
+};
 use atomesh::image::{Image, Units};
+use atomesh::mesh::is_feature_name;
 use atomesh::run::MeshOptions;
 use atomesh_io::mesh::{AnyMesh, LoadedMesh};
 
@@ -54,10 +57,11 @@ pub struct FeaturesRequest {
     /// File for the features in numbers (length or area, mean of b, box), as JSON
     #[cfg_attr(feature = "clap", arg(long, value_name = "JSON"))]
     pub json: Option<PathBuf>,
-    /// Facets are chosen whose value of b is at most this, -1 to 1
-    #[cfg_attr(feature = "clap", arg(long, value_name = "B", default_value_t = Self::default().below,
+    /// Facets are chosen whose value of b is at most this, -1 to 1. Default: the mesh's own facets of features, if
+    /// it has any; else -0.2
+    #[cfg_attr(feature = "clap", arg(long, value_name = "B", allow_hyphen_values = true,
         value_parser = number_in(-1.0, 1.0, "a number from -1 to 1")))]
-    pub below: f64,
+    pub below: Option<f64>,
     /// Value of b along a facet that counts: its mean, or its greatest
     #[cfg_attr(feature = "clap", arg(long, value_name = "VALUE", default_value = "mean",
         value_parser = named::<FacetTest>(&["mean", "max"])))]
@@ -87,7 +91,7 @@ pub struct FeaturesRequest {
 
 impl Default for FeaturesRequest {
     fn default() -> Self {
-        let FeatureFacetOptions { below, test, min_facets, min_measure, close_gaps } =
+        let FeatureFacetOptions { test, min_facets, min_measure, close_gaps, .. } =
             FeatureFacetOptions::default();
         Self {
             mesh: PathBuf::new(),
@@ -98,7 +102,7 @@ impl Default for FeaturesRequest {
             regions: false,
             least_island: 0,
             json: None,
-            below,
+            below: None,
             test,
             min_facets,
             min_measure,
@@ -118,7 +122,7 @@ impl FeaturesRequest {
 
     fn facet_options(&self) -> FeatureFacetOptions {
         FeatureFacetOptions {
-            below: self.below,
+            below: self.below.unwrap_or(FeatureFacetOptions::default().below),
             test: self.test,
             min_facets: self.min_facets,
             min_measure: self.min_measure,
@@ -154,6 +158,9 @@ pub fn features<const D: usize>(
     dimension: &Dimension<D>,
     session: &mut Session<'_>,
 ) -> Result<FeatureSet<D>, JobError> {
+    if let (None, Some(found)) = (request.below, own_features(loaded)) {
+        return Ok(found);
+    }
     let field = match image {
         Some(image) => along(request, loaded, image, dimension, session)?,
         None => {
@@ -167,6 +174,14 @@ pub fn features<const D: usize>(
         }
     };
     Ok((dimension.tools.find_features)(&loaded.mesh, &field, &request.facet_options())?)
+}
+
+/// The features that the mesh's tags name, if they name any.
+fn own_features<const D: usize>(loaded: &LoadedMesh<D>) -> Option<FeatureSet<D>> {
+    let groups = loaded.tags.facet_groups().iter().filter(|group| is_feature_name(&group.name));
+    let groups: Vec<FacetsOfFeature<D>> =
+        groups.map(|group| FacetsOfFeature { facets: group.facets.clone(), mean: -1.0 }).collect();
+    (!groups.is_empty()).then(|| FeatureSet::of_groups(&loaded.mesh, &groups))
 }
 
 /// b along the facets, from an image or potential.

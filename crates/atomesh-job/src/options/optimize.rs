@@ -86,7 +86,7 @@ section! {
         /// Turn the edges (2-D) or faces (3-D) of the mesh onto features: not at all (off), by swaps alone, or
         /// by swaps and moves of points (full). Default: full
         #[arg(long, value_name = "HOW",
-            value_parser = named::<Align>(&["off", "swaps", "full"]))]
+            value_parser = named::<Align>(&["off", "swaps", "full", "conform"]))]
         pub align: Align,
         /// Least angle in degrees that swaps and moves keep or restore: interior angles, below 60, in
         /// 2-D; dihedral angles, below 70.5, in 3-D. Default: 20 in 2-D, 15 in 3-D

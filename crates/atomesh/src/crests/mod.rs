@@ -11,6 +11,7 @@
 
 mod bins;
 mod groups;
+mod pieces;
 mod point;
 mod repelling;
 mod sites;
@@ -19,6 +20,8 @@ mod widen;
 
 pub(crate) use bins::Bins;
 pub use groups::{Hysteresis, in_large_groups, linked, strongest};
+pub(crate) use pieces::tangents;
+pub use pieces::{Foot, Pieces};
 pub use point::FeaturePoint;
 pub use repelling::repelling_crests;
 pub(crate) use sites::{nearest_sites, sites};

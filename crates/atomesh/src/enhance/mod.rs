@@ -35,6 +35,7 @@ pub use mixture::{Mixture, MixtureError, Share, enhance_mixture};
 pub use options::{EdgeOperator, FeatureOptions, Features};
 pub use thin::{CrestOptions, FaultOptions, HorizonOptions, Polarity};
 
+use crate::crests::FeaturePoint;
 use crate::image::{Image, Samples};
 use crate::watch::{Phase, Watch, check};
 use rayon::prelude::*;
@@ -108,6 +109,35 @@ fn denoised<const D: usize>(
     let clean = denoise(&values, &grid, &denoising, watch)?;
     let clean = Image::new(*image.frame(), Samples::F32(clean));
     Ok(Some(clean.expect("there is a value for each sample of the image")))
+}
+
+/// Points on the features of an image, in lattice coordinates: crests between samples, whatever the potential is made
+/// by. `None` for features that are the valleys of the potential itself (dark, bright, labels).
+///
+/// # Errors
+/// As [`enhance()`].
+pub fn feature_points<const D: usize>(
+    image: &Image<D>,
+    options: &FeatureOptions,
+    watch: &mut dyn Watch,
+) -> Result<Option<Vec<FeaturePoint<D>>>, EnhanceError> {
+    let is_crest = matches!(
+        options.features,
+        Features::Edges | Features::Ridges | Features::Faults | Features::Horizons
+    );
+    if !is_crest {
+        return Ok(None);
+    }
+    options.check()?;
+    if let Some(image) = denoised(image, options, watch)? {
+        return feature_points(&image, &FeatureOptions { denoise: None, ..*options }, watch);
+    }
+    let grid = image.frame().grid(options.units);
+    let mut points = thin::crest_points(image, options, watch)?;
+    for point in &mut points {
+        (0..D).for_each(|k| point.position[k] *= grid.step[k]);
+    }
+    Ok(Some(points))
 }
 
 /// Takes samples as a potential as they are, without rescaling.

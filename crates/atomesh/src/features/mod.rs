@@ -110,6 +110,15 @@ pub struct Feature<const D: usize> {
     pub closed: bool,
 }
 
+/// The facets that are known to be those of one feature.
+#[derive(Clone, Debug, Default, PartialEq)]
+pub struct FacetsOfFeature<const D: usize> {
+    /// The facets, in any order.
+    pub facets: Vec<[u32; D]>,
+    /// The mean of b over them.
+    pub mean: f64,
+}
+
 /// The features of a mesh.
 #[derive(Clone, Debug, PartialEq)]
 pub struct FeatureSet<const D: usize> {
@@ -221,6 +230,40 @@ impl<const D: usize> FeatureSet<D> {
             features: features.into_iter().map(|(_, feature)| feature).collect(),
             intersections: ridges.intersections(),
             selection: Selection { chosen: facets.len(), ..Selection::default() },
+        }
+    }
+
+    /// Features whose facets are known, each group one feature, the largest first; groups without facets are left out.
+    ///
+    /// # Panics
+    /// If a corner is not a point of the mesh.
+    pub fn of_groups(mesh: &Mesh<D>, groups: &[FacetsOfFeature<D>]) -> Self {
+        let feature = |group: &FacetsOfFeature<D>| {
+            let mut ascending = group.facets.clone();
+            ascending.iter_mut().for_each(|corners| corners.sort_unstable());
+            ascending.sort_unstable();
+            let found = Self::of_facets(mesh, &ascending, &vec![group.mean; ascending.len()]);
+            let parts = &found.features;
+            let (facets, closed) = (
+                parts.iter().flat_map(|part| part.facets.iter().copied()).collect::<Vec<_>>(),
+                parts.iter().all(|part| part.closed),
+            );
+            let orientable = parts.iter().all(|part| part.orientable);
+            let measure: f64 = facets.iter().map(|facet| measure_of(mesh, facet)).sum();
+            (measure, Feature { facets, mean: group.mean, orientable, closed })
+        };
+        let mut features: Vec<(f64, Feature<D>)> =
+            groups.iter().filter(|group| !group.facets.is_empty()).map(feature).collect();
+        features.sort_by(|a, b| b.0.total_cmp(&a.0)); // stable
+        let mut all: Vec<[u32; D]> =
+            groups.iter().flat_map(|group| group.facets.iter().copied()).collect();
+        all.iter_mut().for_each(|corners| corners.sort_unstable());
+        all.sort_unstable();
+        all.dedup();
+        Self {
+            features: features.into_iter().map(|(_, feature)| feature).collect(),
+            intersections: Ridges::new(&all).intersections(),
+            selection: Selection { chosen: all.len(), ..Selection::default() },
         }
     }
 

@@ -30,6 +30,8 @@ pub enum Align {
     /// Swaps and moves. Points may also be taken away, and in the plane added.
     #[default]
     Full,
+    /// Atoms stand on features before all others, and facets of features are kept ([`crate::conform`]).
+    Conform,
 }
 
 /// How a mesh is improved.
@@ -108,10 +110,18 @@ pub struct ImproveReport {
     pub floor_held: bool,
 }
 
+/// What of a mesh stays.
+#[derive(Clone, Copy, Debug)]
+pub struct Held<'a, const D: usize> {
+    /// Bit k of a point lets it move along axis k.
+    pub freedom: &'a [u8],
+    /// Facets that stay facets, corners ascending, in lexicographic order; their corners may not move.
+    pub facets: &'a [[u32; D]],
+}
+
 /// Improves meshes of one dimension.
 pub trait Improver<const D: usize>: Sync {
-    /// The mesh with its cells swapped and its points moved, and what was done. Bit k of a point's `freedom` lets it
-    /// move along axis k. Points keep their order, without those taken away; added points follow. The result is the
+    /// The mesh with its cells swapped and its points moved, and what was done. Points keep their order, without those taken away; added points follow. The result is the
     /// same at any thread count.
     ///
     /// # Errors
@@ -119,7 +129,7 @@ pub trait Improver<const D: usize>: Sync {
     fn improve(
         &self,
         mesh: Mesh<D>,
-        freedom: &[u8],
+        held: Held<'_, D>,
         fields: FieldsView<'_, D>,
         options: &ImproveOptions,
         watch: &mut dyn Watch,

@@ -1,6 +1,7 @@
 //! The fourth stage: Delaunay's mesh of the atoms.
 
-use crate::improve::Align;
+use crate::conform::feature_facets;
+use crate::improve::{Align, Held};
 use crate::mesh::Mesh;
 use crate::mirror::MirrorReport;
 use crate::optimize::OptimizeReport;
@@ -59,6 +60,13 @@ pub(super) fn improve<const D: usize>(
     };
     let Connected { run, mesh, freedom, report, mirror_report } = connected;
     let options = &run.options().improve;
-    let (mesh, improved) = improver.improve(mesh, &freedom, run.fields(), options, watch)?;
+    let facets: Vec<[u32; D]> = match run.pieces() {
+        Some(pieces) => (feature_facets(&mesh, pieces, run.distance()).iter())
+            .map(|facet| facet.corners)
+            .collect(),
+        None => Vec::new(),
+    };
+    let held = Held { freedom: &freedom, facets: &facets };
+    let (mesh, improved) = improver.improve(mesh, held, run.fields(), options, watch)?;
     Ok(Improved { run, mesh, report, mirror_report, improve_report: Some(improved) })
 }

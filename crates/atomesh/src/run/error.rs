@@ -1,5 +1,6 @@
 //! What can go wrong, and what is odd enough to say.
 
+use crate::conform::ConformError;
 use crate::enhance::EnhanceError;
 use crate::features::FeaturesError;
 use crate::fields::DistanceError;
@@ -138,6 +139,16 @@ macro_rules! from {
     };
 }
 from!(LatticeError => Lattice, OptimizeError => Optimize, ConnectError => Connect, RegionError => Region, SampleError => Sample, ImproveError => Improve, FeaturesError => Features, VoronoiError => Voronoi, MeasureError => Measure);
+
+impl From<ConformError> for RunError {
+    fn from(error: ConformError) -> Self {
+        match error {
+            ConformError::Lattice(error) => Self::Lattice(error),
+            ConformError::Optimize(error) => Self::Optimize(error),
+            ConformError::Cancelled(cancelled) => Self::Cancelled(cancelled),
+        }
+    }
+}
 
 impl From<MirrorError> for RunError {
     fn from(error: MirrorError) -> Self {

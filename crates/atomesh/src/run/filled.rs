@@ -1,5 +1,6 @@
 //! The second stage: atoms that fill the box, not yet moved by the image.
 
+use crate::conform::conform;
 use crate::crests::repelling_crests;
 use crate::lattice::Lattice;
 use crate::mirror::{MirroredLattice, Settling, mirror};
@@ -65,6 +66,11 @@ pub(super) fn settle<const D: usize>(
         let MirroredLattice { lattice, report, optimize_report } =
             mirror(lattice, &crests, run.fields(), settling, watch)?;
         return Ok(Settled { run, lattice, report: optimize_report, mirror_report: Some(report) });
+    }
+    if let Some(pieces) = run.pieces() {
+        let (lattice, report) =
+            conform(lattice, pieces, run.fields(), method.scatterer(), options, watch)?;
+        return Ok(Settled { run, lattice, report, mirror_report: None });
     }
     if run.stays_as_grown() {
         let report = OptimizeReport::new(options.engine);

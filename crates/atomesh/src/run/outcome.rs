@@ -2,8 +2,10 @@
 
 use rayon::prelude::*;
 
+use crate::conform::feature_facets;
 use crate::features::{
-    FacetField, FeatureFaces, FeatureFacetOptions, FeatureSet, feature_faces, find_features,
+    FacetField, FacetsOfFeature, FeatureFaces, FeatureFacetOptions, FeatureSet, feature_faces,
+    find_features,
 };
 use crate::fields::{NominalDistance, ScalarField, feature_density};
 use crate::geometry::{Bounds, Point};
@@ -242,8 +244,24 @@ pub(super) fn features_of<const D: usize>(
     options: &FeatureFacetOptions,
     watch: &mut dyn Watch,
 ) -> Result<FeatureSet<D>, RunError> {
+    if let Some(found) = own_features(outcome, world) {
+        return Ok(found);
+    }
     let field = FacetField::along(outcome.mesh(), outcome.potential(), watch)?;
     Ok(find_features(world, &field, options)?)
+}
+
+/// The features that the mesh was made to keep to.
+fn own_features<const D: usize>(outcome: &Outcome<D>, mesh: &Mesh<D>) -> Option<FeatureSet<D>> {
+    let pieces = outcome.run.pieces()?;
+    let mean = |piece: usize| -pieces.strength(piece as u32).min(1.0);
+    let mut groups: Vec<FacetsOfFeature<D>> = (0..pieces.len())
+        .map(|piece| FacetsOfFeature { facets: Vec::new(), mean: mean(piece) })
+        .collect();
+    for facet in feature_facets(&outcome.mesh, pieces, outcome.distance()) {
+        groups[facet.piece as usize].facets.push(facet.corners);
+    }
+    Some(FeatureSet::of_groups(mesh, &groups))
 }
 
 /// [`Outcome::world_mesh`].
@@ -327,7 +345,10 @@ pub(super) fn tags_of<const D: usize>(outcome: &Outcome<D>) -> Result<Tags<D>, T
         add(interface_name(interface.labels), interface.facets);
     }
     let regions = outcome.labels.clone().map(|of_cells| Regions { of_cells, names: Vec::new() });
-    let tags = Tags::new(&outcome.mesh, groups, regions)?;
+    let mut tags = Tags::new(&outcome.mesh, groups, regions)?;
+    if let Some(features) = own_features(outcome, &outcome.mesh) {
+        tags = tags.merge(features.tags(&outcome.mesh)?)?;
+    }
     Ok(if outcome.frame().is_mirrored() { tags.turned() } else { tags })
 }
 

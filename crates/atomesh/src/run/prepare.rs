@@ -1,10 +1,12 @@
 //! From images and options to b(x), d(x) and β(x).
 
+use crate::crests::{FeaturePoint, Pieces, ValleySearch, bottoms, strongest};
 use crate::enhance::{self, FeatureOptions, Features};
 use crate::fields::{
     Fields, GRADIENT_LIMIT, Grading, ImageWeight, NominalDistance, ScalarField, default_distance,
 };
 use crate::image::{Frame, Grid, Image};
+use crate::improve::Align;
 use crate::region::{Outline, label_samples};
 use crate::watch::{Phase, Watch, check};
 
@@ -13,6 +15,14 @@ use super::inputs::Inputs;
 use super::method::Method;
 use super::options::{MeshKind, MeshOptions, Size};
 use super::prepared::{Parts, Prepared};
+
+/// The fewest points of a piece: so many d over the step, or d² over its square in space.
+const LEAST_PIECE: f64 = 3.0;
+/// The Gaussian by which valleys are found, in samples.
+const VALLEY_SCALE: f64 = 0.9;
+/// The least depth of a valley at all, and over that of the deepest tenth.
+const LEAST_DEPTH: f32 = 0.05;
+const DEPTH_SHARE: f32 = 0.22;
 
 /// Makes b(x), d(x) and β(x).
 pub(super) fn prepare<const D: usize>(
@@ -45,12 +55,27 @@ pub(super) fn prepare<const D: usize>(
         outline.combine(&mut samples);
     }
     let weight = weight(&inputs, grid, options.image_weight)?;
+    let is_masked = outline.is_some();
     warnings.extend(coarse(&grid, &distance));
     check(watch, Phase::Distance, 1.0, None)?;
     let potential = ScalarField::potential(grid, samples, options.interpolation)?;
+    let pieces = match options.improve.align {
+        Align::Conform if !is_masked => pieces(&inputs, &options, &potential, &distance, watch)?,
+        _ => None,
+    };
     let fields = Fields::new(potential, weight, distance)?;
     let method = method.clone();
-    Ok(Prepared::new(Parts { method, options, frame, grid, fields, outline, labels, warnings }))
+    Ok(Prepared::new(Parts {
+        method,
+        options,
+        frame,
+        grid,
+        fields,
+        outline,
+        labels,
+        warnings,
+        pieces,
+    }))
 }
 
 /// Where the mesh ends, if there is a mask and it does not hold the whole box.
@@ -81,6 +106,59 @@ fn coarse<const D: usize>(grid: &Grid<D>, distance: &NominalDistance<D>) -> Opti
     let (distance, extent) = (distance.least(), grid.bounds().extent());
     let axis = (0..D).find(|&k| distance > extent[k])?;
     Some(Warning::Coarse { axis, distance, extent: extent[axis] })
+}
+
+/// The pieces of features, if there are any.
+fn pieces<const D: usize>(
+    inputs: &Inputs<'_, D>,
+    options: &MeshOptions<D>,
+    potential: &ScalarField<D>,
+    distance: &NominalDistance<D>,
+    watch: &mut dyn Watch,
+) -> Result<Option<Pieces<D>>, RunError> {
+    let grid = potential.grid();
+    let kinds: Vec<FeatureOptions> = match &options.mixture {
+        _ if inputs.is_potential => Vec::new(),
+        Some(mixture) => (mixture.shares().iter())
+            .map(|share| FeatureOptions { features: share.features, ..options.features })
+            .collect(),
+        None => vec![options.features],
+    };
+    let mut points = Vec::new();
+    let mut is_valley = inputs.is_potential;
+    for kind in kinds {
+        let kind = FeatureOptions { units: options.units, ..kind };
+        match enhance::feature_points(inputs.image, &kind, watch)? {
+            Some(found) => points.extend(found),
+            None => is_valley |= kind.features != Features::None,
+        }
+    }
+    if is_valley {
+        points.extend(deep_valleys(potential, watch)?);
+    }
+    let size = distance.least() / grid.step.iter().product::<f64>().powf(1.0 / D as f64);
+    let least_count = LEAST_PIECE * size.powi(D as i32 - 1);
+    let pieces = Pieces::new(points, grid, least_count.ceil() as usize);
+    Ok((!pieces.is_empty()).then_some(pieces))
+}
+
+/// The bottoms of the deep valleys of b, in lattice coordinates.
+fn deep_valleys<const D: usize>(
+    potential: &ScalarField<D>,
+    watch: &mut dyn Watch,
+) -> Result<Vec<FeaturePoint<D>>, RunError> {
+    let grid = potential.grid();
+    if potential.range().0 > -LEAST_DEPTH {
+        return Ok(Vec::new());
+    }
+    let search = ValleySearch {
+        sigma: [VALLEY_SCALE; D],
+        least_depth: LEAST_DEPTH,
+        phase: Phase::Potential,
+    };
+    let found = bottoms(potential.samples(), grid.shape, &search, watch)?;
+    let found = strongest(found, DEPTH_SHARE);
+    Ok(found.iter().map(|point| point.in_lattice(grid)).collect())
 }
 
 /// b at the samples: enhanced, or as given.

@@ -3,6 +3,7 @@
 use std::fmt;
 use std::sync::Arc;
 
+use crate::crests::Pieces;
 use crate::fields::{Fields, FieldsView, Interpolation, NominalDistance, ScalarField};
 use crate::geometry::{Bounds, Point, compact_order};
 use crate::image::{Frame, Grid};
@@ -40,6 +41,8 @@ pub(super) struct Parts<const D: usize> {
     pub outline: Option<Outline<D>>,
     pub labels: Option<Vec<i32>>,
     pub warnings: Vec<Warning>,
+    /// The features that facets are made to keep to.
+    pub pieces: Option<Pieces<D>>,
 }
 
 impl<const D: usize> fmt::Debug for Prepared<D> {
@@ -91,6 +94,11 @@ impl<const D: usize> Prepared<D> {
     /// Where the mesh ends, if a mask says so.
     pub fn outline(&self) -> Option<&Outline<D>> {
         self.0.outline.as_ref()
+    }
+
+    /// The features that facets are made to keep to, if any are.
+    pub fn pieces(&self) -> Option<&Pieces<D>> {
+        self.0.pieces.as_ref()
     }
 
     /// What was odd so far.

@@ -1,5 +1,6 @@
 //! The third stage: atoms where they end.
 
+use crate::conform;
 use crate::lattice::{Lattice, Outlined};
 use crate::mesh::{Mesh, merge_duplicates};
 use crate::mirror::MirrorReport;
@@ -98,6 +99,11 @@ fn connect_all<const D: usize>(
 ) -> Result<(Mesh<D>, Vec<u8>), RunError> {
     // where the image alone counts, atoms may fall into the same corner
     let (points, merged) = merge_duplicates(lattice.atoms());
+    if let (Some(pieces), true) = (run.pieces(), points.len() == lattice.len()) {
+        let delaunay = run.parts().method.delaunay();
+        let (lattice, mesh) = conform::connect(lattice, pieces, run.distance(), delaunay, watch)?;
+        return Ok((mesh, lattice.freedom()));
+    }
     let freedom = lattice.freedom_of(&merged, points.len());
     drop(lattice);
     Ok((run.parts().method.delaunay().connect(&points, watch)?, freedom))

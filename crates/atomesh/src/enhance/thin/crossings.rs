@@ -182,6 +182,9 @@ pub(super) struct Summit {
     pub(super) offset: f32,
     /// The slope of the smoothed image along the normal: at the sample, or, of the steepest place, there.
     pub(super) slope: f32,
+    /// The second derivative, along the normal, of the smoothed image, or, of the steepest place, of the logarithm of
+    /// its slope.
+    pub(super) bend: f32,
 }
 
 /// A row of slopes, and the sign that each has as a neighbour's.
@@ -242,7 +245,7 @@ impl<const D: usize> Row<'_, D> {
             let there = sign * self.slope(normal, x, step::<D>(k, uphill));
             bend += normal[k] * uphill as f32 * (there - here) / self.grid.step[k] as f32;
         }
-        (bend < 0.0).then(|| Summit { offset: -here / bend, slope: sign * here })
+        (bend < 0.0).then(|| Summit { offset: -here / bend, slope: sign * here, bend })
     }
 
     /// Where along a normal through sample `x` the slope along it is greatest; `None` if the slope is not bent
@@ -271,7 +274,7 @@ impl<const D: usize> Row<'_, D> {
         }
         let offset = -rise / bend;
         let slope = (here + 0.5 * rise * offset).exp();
-        (bend < 0.0 && offset.is_finite()).then_some(Summit { offset, slope })
+        (bend < 0.0 && offset.is_finite()).then_some(Summit { offset, slope, bend })
     }
 
     /// Second derivatives of the smoothed image, per squared lattice unit.

@@ -110,6 +110,23 @@ pub(super) fn thinned<const D: usize>(
         Some(width) if width > 0.0 => width,
         _ => WIDTH * D as f64 * grid.least_step(),
     };
+    let crests = crest_points(image, options, watch)?;
+    check(watch, Phase::Potential, 0.9, None)?;
+    let mut values = widen(&crests, &grid, width);
+    if options.repel {
+        values.par_iter_mut().for_each(|b| *b = -*b + 0.0); // no −0
+    }
+    check(watch, Phase::Potential, 1.0, None)?;
+    Ok(Enhanced { values, constant: crests.is_empty() })
+}
+
+/// The crests of features that are thinned, or of edges; positions in samples, normals per lattice unit.
+pub(super) fn crest_points<const D: usize>(
+    image: &Image<D>,
+    options: &FeatureOptions,
+    watch: &mut dyn Watch,
+) -> Result<Vec<FeaturePoint<D>>, EnhanceError> {
+    let grid = image.frame().grid(options.units);
     let copied;
     let values = match image.samples() {
         Samples::F32(values) => values,
@@ -118,17 +135,10 @@ pub(super) fn thinned<const D: usize>(
             &copied
         }
     };
-    let crests = match options.features {
-        Features::Ridges => crests(&Ridges(options.ridges), values, &grid, watch)?,
-        Features::Faults => crests(&Faults(options.faults), values, &grid, watch)?,
-        Features::Horizons => crests(&Horizons(options.horizons), values, &grid, watch)?,
-        _ => crests(&Edges(options.edges), values, &grid, watch)?,
-    };
-    check(watch, Phase::Potential, 0.9, None)?;
-    let mut values = widen(&crests, &grid, width);
-    if options.repel {
-        values.par_iter_mut().for_each(|b| *b = -*b + 0.0); // no −0
+    match options.features {
+        Features::Ridges => crests(&Ridges(options.ridges), values, &grid, watch),
+        Features::Faults => crests(&Faults(options.faults), values, &grid, watch),
+        Features::Horizons => crests(&Horizons(options.horizons), values, &grid, watch),
+        _ => crests(&Edges(options.edges), values, &grid, watch),
     }
-    check(watch, Phase::Potential, 1.0, None)?;
-    Ok(Enhanced { values, constant: crests.is_empty() })
 }

@@ -25,7 +25,7 @@ mod swaps;
 mod tests;
 mod triangles;
 
-use super::{Align, ImproveError, ImproveOptions, ImproveReport, Improver};
+use super::{Align, Held, ImproveError, ImproveOptions, ImproveReport, Improver};
 use crate::fields::{FieldsView, NominalDistance};
 use crate::mesh::Mesh;
 use crate::watch::{Cancelled, Phase, Watch, check};
@@ -53,7 +53,7 @@ impl Improver<2> for PlaneImprover {
     fn improve(
         &self,
         mesh: Mesh<2>,
-        freedom: &[u8],
+        held: Held<'_, 2>,
         fields: FieldsView<'_, 2>,
         options: &ImproveOptions,
         watch: &mut dyn Watch,
@@ -64,13 +64,16 @@ impl Improver<2> for PlaneImprover {
         if options.align == Align::Off {
             return Ok((mesh, before.report(before)));
         }
-        let guides = find_guides(fields, watch)?;
+        let guides = match options.align {
+            Align::Conform => Vec::new(), // features have their edges
+            _ => find_guides(fields, watch)?,
+        };
         if guides.is_empty() && before.below == 0 {
             return Ok((mesh, before.report(before)));
         }
         let energy = Energy::new(&guides, sine_floor);
-        let mut triangles = Triangles::new(mesh, &guides);
-        let mover = Mover::new(&triangles, freedom, fields.distance, &energy);
+        let mut triangles = Triangles::new(mesh, &guides, held.facets);
+        let mover = Mover::new(&triangles, held.freedom, fields.distance, &energy);
         let mut rounds = Rounds { energy, mover, distance: fields.distance, align: options.align };
         let report = rounds.run(&mut triangles, watch)?;
         let mesh = triangles.into_mesh()?;
@@ -97,7 +100,7 @@ impl Rounds<'_> {
         watch: &mut dyn Watch,
     ) -> Result<ImproveReport, Cancelled> {
         let Self { energy, mover, distance, align } = self;
-        let is_full = *align == Align::Full;
+        let is_full = matches!(align, Align::Full | Align::Conform);
         let mut report = ImproveReport::default();
         for round in 0..ROUNDS {
             check(watch, Phase::Improve, round as f64 / ROUNDS as f64, None)?;

@@ -3,7 +3,7 @@
 use rand::{RngExt, SeedableRng};
 use rand_pcg::Pcg64;
 
-use super::super::{Align, ImproveError, ImproveOptions, ImproveReport, Improver};
+use super::super::{Align, Held, ImproveError, ImproveOptions, ImproveReport, Improver};
 use super::PlaneImprover;
 use super::energy::{Edge, Energy, Shape, least_sine};
 use super::guides::{Guide, find_guides};
@@ -104,7 +104,9 @@ impl Scene {
     fn improve(&self, mesh: &Mesh<2>, freedom: &[u8], align: Align) -> (Mesh<2>, ImproveReport) {
         let options = ImproveOptions { align, ..ImproveOptions::for_dimension(2) };
         let (mesh, fields) = (mesh.clone(), self.fields());
-        PlaneImprover.improve(mesh, freedom, fields, &options, &mut Silent).unwrap()
+        PlaneImprover
+            .improve(mesh, Held { freedom, facets: &[] }, fields, &options, &mut Silent)
+            .unwrap()
     }
 
     /// The share of the line, away from its ends, beside which an edge passes within a sample and 20°.
@@ -376,7 +378,7 @@ fn beyond_the_outline_of_a_mesh_nothing_guides() {
     let points: Vec<Point<2>> = used.iter().map(|&c| mesh.points()[c as usize]).collect();
     let part = Mesh::new(points.clone(), corners.iter().map(number).collect()).unwrap();
     let found = find_guides(scene.fields(), &mut Silent).unwrap();
-    let triangles = Triangles::new(part.clone(), &found);
+    let triangles = Triangles::new(part.clone(), &found, &[]);
     let held: Vec<u32> =
         (0..triangles.len() as u32).flat_map(|c| triangles.guides_in(c).to_vec()).collect();
     let outside = |i: &u32| {
@@ -406,7 +408,13 @@ fn floors_that_no_triangle_keeps_are_refused() {
     for min_angle in [-1.0, 60.0, f64::NAN] {
         let options = ImproveOptions { min_angle, align: Align::Full };
         let (mesh, fields) = (mesh.clone(), scene.fields());
-        let result = PlaneImprover.improve(mesh, &freedom, fields, &options, &mut Silent);
+        let result = PlaneImprover.improve(
+            mesh,
+            Held { freedom: &freedom, facets: &[] },
+            fields,
+            &options,
+            &mut Silent,
+        );
         assert!(matches!(result, Err(ImproveError::MinAngle { .. })));
     }
 }
@@ -473,7 +481,7 @@ fn rounds_lower_the_energy_that_is_summed_over_the_whole_mesh() {
     let found = find_guides(scene.fields(), &mut Silent).unwrap();
     let energy = Energy::new(&found, 20f64.to_radians().sin());
     let (mesh, freedom) = scene.scattered(3);
-    let mut triangles = Triangles::new(mesh.clone(), &found);
+    let mut triangles = Triangles::new(mesh.clone(), &found, &[]);
     let fast = |t: &Triangles| -> f64 {
         let cells = 0..t.len() as u32;
         cells.map(|c| energy.of_cell(t.corners_at(c), t.guides_in(c)).cost).sum()

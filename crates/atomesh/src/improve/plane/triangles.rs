@@ -23,11 +23,14 @@ pub(super) struct Triangles {
 }
 
 impl Triangles {
-    /// The cells of a mesh without fault, and the guides in them.
-    pub fn new(mesh: Mesh<2>, guides: &[Guide]) -> Self {
+    /// The cells of a mesh without fault, and the guides in them. The edges of `held`, ascending, stay.
+    pub fn new(mesh: Mesh<2>, guides: &[Guide], held: &[[u32; 2]]) -> Self {
         let mut neighbours = vec![[NONE; 3]; mesh.cell_count()];
         for facet in mesh.facets() {
             let Some(neighbour) = facet.neighbour else { continue };
+            if held.binary_search(&facet.corners).is_ok() {
+                continue; // as on the hull
+            }
             for (cell, other) in [(facet.cell, neighbour), (neighbour, facet.cell)] {
                 let corners = &mesh.corners()[3 * cell as usize..][..3];
                 let off = corners.iter().position(|c| !facet.corners.contains(c));

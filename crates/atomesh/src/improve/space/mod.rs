@@ -29,7 +29,7 @@ mod strays;
 mod tests;
 mod tetrahedra;
 
-use super::{Align, ImproveError, ImproveOptions, ImproveReport, Improver};
+use super::{Align, Held, ImproveError, ImproveOptions, ImproveReport, Improver};
 use crate::fields::FieldsView;
 use crate::geometry::{Bounds, Point};
 use crate::mesh::Mesh;
@@ -63,7 +63,7 @@ impl Improver<3> for SpaceImprover {
     fn improve(
         &self,
         mesh: Mesh<3>,
-        freedom: &[u8],
+        held: Held<'_, 3>,
         fields: FieldsView<'_, 3>,
         options: &ImproveOptions,
         watch: &mut dyn Watch,
@@ -76,13 +76,15 @@ impl Improver<3> for SpaceImprover {
         };
         let is_weighted = fields.weight.as_constant() != Some(0.0);
         let work = Work {
-            field: is_weighted.then(|| DepthField::new(fields.potential)),
+            field: (is_weighted && options.align != Align::Conform)
+                .then(|| DepthField::new(fields.potential)),
             fields,
             align: options.align,
             cosine_limit: (options.min_angle + MARGIN).to_radians().cos(),
         };
-        let freedom = if options.align == Align::Full { freedom } else { &vec![0; points.len()] };
-        let mut whole = WholeMesh::new(points, freedom, &corners, &bounds);
+        let moves = matches!(options.align, Align::Full | Align::Conform);
+        let freedom = if moves { held.freedom } else { &vec![0; points.len()] };
+        let mut whole = WholeMesh::new(points, freedom, &corners, &bounds, held.facets);
         let mut report =
             ImproveReport { angle_before: whole.angles(1.0).least(), ..Default::default() };
         if options.align != Align::Off {
@@ -99,7 +101,7 @@ impl Improver<3> for SpaceImprover {
 
 /// All passes over all parts.
 fn improve_parts(
-    whole: &mut WholeMesh,
+    whole: &mut WholeMesh<'_>,
     work: &Work<'_>,
     report: &mut ImproveReport,
     watch: &mut dyn Watch,

@@ -9,6 +9,7 @@ use super::shape::shape;
 use super::tetrahedra::{NONE, Tetrahedra};
 use crate::geometry::{Bounds, Point};
 use rayon::prelude::*;
+use std::collections::HashSet;
 
 /// The points of a part, about: enough that few are held, few enough for all cores and for a cache. Tests cut small meshes too.
 const PART: usize = if cfg!(test) { 60 } else { 12_000 };
@@ -23,7 +24,11 @@ pub(super) const CUTS: [f64; 3] = [0.5, 0.3, 0.64];
 const LAYERS: usize = 1;
 
 /// The mesh between passes.
-pub(super) struct WholeMesh {
+pub(super) struct WholeMesh<'a> {
+    /// Facets that stay.
+    facets: &'a [[u32; 3]],
+    /// Whether a point is a corner of one.
+    is_on_facet: Vec<bool>,
     pub points: Vec<Point<3>>,
     /// As in [`Tetrahedra`].
     freedom: Vec<u8>,
@@ -87,14 +92,22 @@ fn halves<'a>(points: &[Point<3>], slice: &'a mut [u32], cut: f64) -> [&'a mut [
     [low, high]
 }
 
-impl WholeMesh {
+impl<'a> WholeMesh<'a> {
     /// The mesh as it is given.
-    pub fn new(points: Vec<Point<3>>, freedom: &[u8], corners: &[u32], bounds: &Bounds<3>) -> Self {
+    pub fn new(
+        points: Vec<Point<3>>,
+        freedom: &[u8],
+        corners: &[u32],
+        bounds: &Bounds<3>,
+        facets: &'a [[u32; 3]],
+    ) -> Self {
+        let mut is_on_facet = vec![false; points.len()];
+        facets.iter().flatten().for_each(|&c| is_on_facet[c as usize] = true);
         let sides: Vec<u8> = points.iter().map(|p| bounds.sides(p, 0.0)).collect();
         // whatever the lattice says, a point on a side stays on it
         let freedom = freedom.iter().zip(&points).map(|(f, p)| f & bounds.freedom(p)).collect();
         let corners = corners.chunks_exact(4).map(|c| [c[0], c[1], c[2], c[3]]).collect();
-        Self { points, freedom, sides, corners }
+        Self { facets, is_on_facet, points, freedom, sides, corners }
     }
 
     /// Drops points that no cell has any more.
@@ -191,6 +204,7 @@ impl WholeMesh {
                 })
             })
             .collect();
+        let held_facets = self.held_facets(cells, local);
         points.iter().for_each(|&point| local[point as usize] = NONE);
         let mut missing: Vec<u32> = points.iter().map(|&p| valences[p as usize]).collect();
         corners.iter().flatten().for_each(|&c| missing[c as usize] -= 1);
@@ -206,7 +220,35 @@ impl WholeMesh {
         let sides = points.iter().map(|&p| self.sides[p as usize]).collect();
         let was_held = |&p: &u32| pending.is_none_or(|pending| pending[p as usize]);
         let is_pending = points.iter().map(was_held).collect();
-        Part { tetrahedra: Tetrahedra::new(at, freedom, sides, corners), points, held, is_pending }
+        Part {
+            tetrahedra: Tetrahedra::new(at, freedom, sides, corners, &held_facets),
+            points,
+            held,
+            is_pending,
+        }
+    }
+
+    /// The facets of some cells that stay, by the numbers of a part, corners ascending.
+    fn held_facets(&self, cells: &[u32], local: &[u32]) -> HashSet<[u32; 3]> {
+        let mut found = HashSet::new();
+        if self.facets.is_empty() {
+            return found;
+        }
+        for &cell in cells {
+            let corners = &self.corners[cell as usize];
+            for k in 0..4 {
+                let mut facet = [1, 2, 3].map(|n| corners[(k + n) & 3]);
+                if facet.iter().all(|&c| self.is_on_facet[c as usize]) {
+                    facet.sort_unstable();
+                    if self.facets.binary_search(&facet).is_ok() {
+                        let mut own = facet.map(|c| local[c as usize]);
+                        own.sort_unstable();
+                        found.insert(own);
+                    }
+                }
+            }
+        }
+        found
     }
 
     /// Takes the cells and points of parts back, in place of the cells that they were made of.

@@ -15,6 +15,7 @@ use super::smooth::{opposite_facet, worst_cosine};
 use super::tetrahedra::{NONE, Tetrahedra};
 use crate::fields::NominalDistance;
 use crate::geometry::{Point, distance_squared};
+use std::collections::HashSet;
 
 /// The least depth of a valley that is worth the effort.
 const LEAST_DEPTH: f64 = 0.6;
@@ -197,8 +198,13 @@ impl Aligner<'_> {
         let corners = cells.iter().map(|&c| tetrahedra.corners[c as usize].map(local)).collect();
         let take = |of: &[u8]| points.iter().map(|&p| of[p as usize]).collect::<Vec<u8>>();
         let at = points.iter().map(|&p| tetrahedra.points[p as usize]).collect();
-        let mut small =
-            Tetrahedra::new(at, take(&tetrahedra.freedom), take(&tetrahedra.sides), corners);
+        let mut small = Tetrahedra::new(
+            at,
+            take(&tetrahedra.freedom),
+            take(&tetrahedra.sides),
+            corners,
+            &HashSet::new(),
+        );
         let mut contrast = Contrast::NONE;
         points.iter().for_each(|&p| contrast.include(self.depths[p as usize]));
         for (freedom, &p) in small.freedom.iter_mut().zip(&points) {
@@ -333,8 +339,13 @@ impl Trial {
         let cells = cells.map(|cell| cell.map(|c| if c == stray { into } else { c })).collect();
         let mut points = tetrahedra.points.clone();
         points[into as usize] = at;
-        let mut small =
-            Tetrahedra::new(points, tetrahedra.freedom.clone(), tetrahedra.sides.clone(), cells);
+        let mut small = Tetrahedra::new(
+            points,
+            tetrahedra.freedom.clone(),
+            tetrahedra.sides.clone(),
+            cells,
+            &HashSet::new(),
+        );
         small.freedom[into as usize] = 0;
         // the rim is the same, so if no cell is turned over they fill the same space
         if small.shapes.iter().any(|shape| shape.quality <= 0.0) || rim(&small) != rim(tetrahedra) {

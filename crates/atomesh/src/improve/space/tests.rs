@@ -8,6 +8,7 @@ use crate::mesh::Delaunay;
 use crate::watch::Silent;
 use edge_ring::{EdgeRing, MOST};
 use proptest::prelude::*;
+use std::collections::HashSet;
 use tetrahedra::Tetrahedra;
 
 /// The box of all tests but those of one cell.
@@ -48,7 +49,13 @@ fn improve(
     let distance = NominalDistance::constant(potential.grid(), 3.0).unwrap();
     let fields = FieldsView { potential, weight: &weight, distance: &distance };
     let freedom = vec![7; mesh.points().len()];
-    SpaceImprover.improve(mesh, &freedom, fields, options, &mut Silent)
+    SpaceImprover.improve(
+        mesh,
+        Held { freedom: &freedom, facets: &[] },
+        fields,
+        options,
+        &mut Silent,
+    )
 }
 
 /// A crystal whose points are moved at random: what a lattice is like.
@@ -120,7 +127,7 @@ fn wheel(count: usize, shifts: &[f64]) -> Tetrahedra {
     let at = |n: usize| 2 + (n % count) as u32;
     let cells = (0..count).map(|n| [0, 1, at(n), at(n + 1)]).collect();
     let all = points.len();
-    Tetrahedra::new(points, vec![7; all], vec![0; all], cells)
+    Tetrahedra::new(points, vec![7; all], vec![0; all], cells, &HashSet::new())
 }
 
 proptest! {
@@ -160,7 +167,8 @@ fn a_swap_leaves_neighbours_as_cells_put_together_have_them() {
     slivers::remove_edge(&mut tetrahedra, &ring, &filling);
     let cells: Vec<[u32; 4]> = tetrahedra.cells().copied().collect();
     assert_eq!(cells.len(), 6);
-    let fresh = Tetrahedra::new(tetrahedra.points.clone(), vec![7; 7], vec![0; 7], cells);
+    let fresh =
+        Tetrahedra::new(tetrahedra.points.clone(), vec![7; 7], vec![0; 7], cells, &HashSet::new());
     let beyond =
         |tetrahedra: &Tetrahedra, cell: usize, k: usize| match tetrahedra.neighbours[cell][k] {
             tetrahedra::NONE => None,

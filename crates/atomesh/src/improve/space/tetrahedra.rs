@@ -6,6 +6,7 @@
 
 use super::shape::{Shape, shape};
 use crate::geometry::Point;
+use std::collections::HashSet;
 
 /// No cell, no point.
 pub(super) const NONE: u32 = u32::MAX;
@@ -56,14 +57,22 @@ fn facet_key(cell: &[u32; 4], k: usize) -> [u32; 3] {
 }
 
 impl Tetrahedra {
-    /// These cells; see [`Self::freedom`] and [`Self::sides`].
+    /// These cells; see [`Self::freedom`] and [`Self::sides`]. The facets of `held` stay.
     pub fn new(
         points: Vec<Point<3>>,
         freedom: Vec<u8>,
         sides: Vec<u8>,
         corners: Vec<[u32; 4]>,
+        held: &HashSet<[u32; 3]>,
     ) -> Self {
-        let neighbours = neighbours_of(points.len(), &corners);
+        let mut neighbours = neighbours_of(points.len(), &corners);
+        if !held.is_empty() {
+            for (corners, neighbours) in corners.iter().zip(&mut neighbours) {
+                for k in (0..4).filter(|&k| held.contains(&facet_key(corners, k))) {
+                    neighbours[k] = NONE;
+                }
+            }
+        }
         let mut cell_of = vec![NONE; points.len()];
         for (cell, corners) in corners.iter().enumerate() {
             corners.iter().for_each(|&c| cell_of[c as usize] = cell as u32);

@@ -1,0 +1,170 @@
+//! Atoms on features: on nodes, then on curves, then, in space, on surfaces.
+
+use rayon::prelude::*;
+
+use crate::crests::{Bins, Pieces};
+use crate::fields::NominalDistance;
+use crate::geometry::{Bounds, Point, difference, distance_squared, dot};
+use crate::watch::{Cancelled, Phase, Watch, check};
+
+use super::curves::Curves;
+
+/// The least distance of two atoms of different pieces, over d: the weaker piece is not met there.
+const APART: f64 = 0.45;
+/// The first distance of atoms on a surface, over d: a random packing of discs has as many as a hexagonal lattice of
+/// edges d if they are this far apart (Feder 1980: 0.547 of the area is covered).
+const FIRST: f64 = 0.75;
+/// The least distance of atoms on a surface once they have settled, over d.
+const SETTLED: f64 = 0.55;
+/// How often atoms on surfaces are moved by the pair force, and how far at most each time, over d.
+const ROUNDS: usize = 60;
+const LONGEST: f64 = 0.1;
+const RATE: f64 = 0.08;
+
+/// An atom on a feature.
+#[derive(Clone, Debug, PartialEq)]
+pub(super) struct FeatureAtom<const D: usize> {
+    pub position: Point<D>,
+    /// The pieces that it is on.
+    pub pieces: Vec<u32>,
+    /// The dimension of what it is on: 0 a node, 1 a curve, 2 a surface.
+    pub rank: u8,
+}
+
+impl<const D: usize> FeatureAtom<D> {
+    pub fn new(position: Point<D>, pieces: Vec<u32>, rank: u8) -> Self {
+        Self { position, pieces, rank }
+    }
+}
+
+/// Atoms about d(x) apart on all pieces: those of the stronger pieces first wherever two are too near.
+///
+/// # Errors
+/// [`Cancelled`] if the watch ends the work.
+pub(super) fn feature_atoms<const D: usize>(
+    pieces: &Pieces<D>,
+    bounds: &Bounds<D>,
+    distance: &NominalDistance<D>,
+    watch: &mut dyn Watch,
+) -> Result<Vec<FeatureAtom<D>>, Cancelled> {
+    check(watch, Phase::Grow, 0.0, None)?;
+    let curves = Curves::of(pieces, bounds, distance);
+    let mut atoms = apart(curves.atoms(distance), bounds, distance);
+    if D > 2 {
+        let held = atoms.len();
+        add_on_surfaces(&mut atoms, pieces, bounds, distance);
+        settle(&mut atoms, held, pieces, bounds, distance, watch)?;
+        atoms = apart(atoms, bounds, distance);
+    }
+    check(watch, Phase::Grow, 0.2, None)?;
+    Ok(atoms)
+}
+
+/// The atoms without those too near to one before: on lower ranks, and on stronger pieces.
+fn apart<const D: usize>(
+    mut atoms: Vec<FeatureAtom<D>>,
+    bounds: &Bounds<D>,
+    distance: &NominalDistance<D>,
+) -> Vec<FeatureAtom<D>> {
+    let first = |atom: &FeatureAtom<D>| atom.pieces.iter().copied().min().unwrap_or(u32::MAX);
+    atoms.sort_by_key(|atom| (atom.rank, first(atom))); // stable
+    let mut bins = Bins::new(bounds, distance.least(), atoms.len());
+    let mut kept: Vec<FeatureAtom<D>> = Vec::new();
+    for atom in atoms {
+        let d = distance.at(&atom.position);
+        let mut is_free = true;
+        bins.near(&atom.position, SETTLED.max(APART) * d, |i| {
+            let other: &FeatureAtom<D> = &kept[i];
+            let shares = atom.pieces.iter().any(|piece| other.pieces.contains(piece));
+            let least = if shares { SETTLED } else { APART };
+            let squared = distance_squared(&other.position, &atom.position);
+            is_free &= squared >= (least * d).powi(2);
+        });
+        if is_free {
+            bins.push(&atom.position);
+            kept.push(atom);
+        }
+    }
+    kept
+}
+
+/// Points of pieces that are far enough from the atoms before them.
+fn add_on_surfaces<const D: usize>(
+    atoms: &mut Vec<FeatureAtom<D>>,
+    pieces: &Pieces<D>,
+    bounds: &Bounds<D>,
+    distance: &NominalDistance<D>,
+) {
+    let mut bins = Bins::new(bounds, distance.least(), pieces.points().len());
+    atoms.iter().for_each(|atom| bins.push(&atom.position));
+    let mut order: Vec<usize> = (0..pieces.points().len()).collect();
+    // a fixed shuffle, so that no row of samples comes first
+    order.sort_by_key(|&i| (i as u64).wrapping_mul(0x9e37_79b9_7f4a_7c15).rotate_left(23));
+    let all: Vec<_> = pieces.points().collect();
+    for i in order {
+        let (point, piece) = all[i];
+        let d = distance.at(&point.position);
+        let mut is_free = true;
+        bins.near(&point.position, FIRST * d, |j| {
+            let other: &FeatureAtom<D> = &atoms[j];
+            let least = if other.pieces.contains(&piece) { FIRST } else { APART };
+            let squared = distance_squared(&other.position, &point.position);
+            is_free &= squared >= (least * d).powi(2);
+        });
+        if is_free {
+            bins.push(&point.position);
+            atoms.push(FeatureAtom::new(point.position, vec![piece], 2));
+        }
+    }
+}
+
+/// Moves the atoms from `held` on by the pair force, each along its piece.
+fn settle<const D: usize>(
+    atoms: &mut Vec<FeatureAtom<D>>,
+    held: usize,
+    pieces: &Pieces<D>,
+    bounds: &Bounds<D>,
+    distance: &NominalDistance<D>,
+    watch: &mut dyn Watch,
+) -> Result<(), Cancelled> {
+    for round in 0..ROUNDS {
+        check(watch, Phase::Grow, 0.2 * round as f64 / ROUNDS as f64, None)?;
+        let bins = Bins::of(bounds, distance.least(), atoms.iter().map(|atom| atom.position));
+        let moved = |(i, atom): (usize, &FeatureAtom<D>)| {
+            let d = distance.at(&atom.position);
+            let mut force = [0.0; D];
+            bins.near(&atom.position, 1.5 * d, |j| {
+                if i != j {
+                    add_force(&mut force, &atom.position, &atoms[j].position, d);
+                }
+            });
+            let length = RATE * dot(&force, &force).sqrt();
+            let scale = RATE * d * (LONGEST / length.max(LONGEST));
+            let to: Point<D> = std::array::from_fn(|k| atom.position[k] + scale * force[k]);
+            let to = bounds.clamp(&to);
+            let foot = pieces.foot_on(atom.pieces[0], &to, 2.0 * d)?;
+            let place = bounds.clamp(&foot.position);
+            (foot.beyond == 0.0).then_some(place)
+        };
+        let places: Vec<Option<Point<D>>> = (atoms[held..].par_iter().enumerate())
+            .with_min_len(1 << 6)
+            .map(|(i, atom)| moved((held + i, atom)))
+            .collect();
+        for (atom, place) in atoms[held..].iter_mut().zip(places) {
+            atom.position = place.unwrap_or(atom.position);
+        }
+    }
+    Ok(())
+}
+
+/// Adds the pair force that an atom at `other` has on one at `at`, over its greatest (Shimada 1993).
+fn add_force<const D: usize>(force: &mut Point<D>, at: &Point<D>, other: &Point<D>, d: f64) {
+    let offset = difference(at, other);
+    let r = dot(&offset, &offset).sqrt();
+    let u = r / d;
+    if u >= 1.5 || r == 0.0 {
+        return;
+    }
+    let push = 9.0 / 8.0 - 19.0 / 8.0 * u * u + 5.0 / 4.0 * u * u * u;
+    (0..D).for_each(|k| force[k] += push / r * offset[k]);
+}

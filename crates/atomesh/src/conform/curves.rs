@@ -1,0 +1,371 @@
+//! All curves of all pieces, where they meet, and the atoms on them.
+
+use crate::crests::{Bins, Pieces};
+use crate::fields::NominalDistance;
+use crate::geometry::{Bounds, Point, difference, distance_squared, dot};
+
+use super::atoms::FeatureAtom;
+use super::trace::{Curve, Cut, End, Tracer};
+
+/// A curve or a part of one shorter than this, over d, has no atoms of its own.
+const LEAST_LENGTH: f64 = 0.75;
+/// Ends nearer to another curve than this, over d, are joined to it.
+const JOIN: f64 = 0.6;
+
+/// A place at which curves meet or end.
+#[derive(Clone, Debug)]
+struct Node<const D: usize> {
+    place: Point<D>,
+    pieces: Vec<u32>,
+}
+
+/// The curves of all pieces and the nodes on them.
+pub(super) struct Curves<const D: usize> {
+    curves: Vec<Curve<D>>,
+    /// For each curve the nodes on it, by the length at which they are.
+    stops: Vec<Vec<(f64, u32)>>,
+    nodes: Vec<Node<D>>,
+}
+
+impl<const D: usize> Curves<D> {
+    /// The curves of all pieces: in the plane the pieces themselves, in space where they meet sides and each other.
+    pub fn of(pieces: &Pieces<D>, bounds: &Bounds<D>, distance: &NominalDistance<D>) -> Self {
+        let mut curves = traced(pieces, bounds, distance);
+        join_ends(&mut curves, pieces, distance);
+        let mut found = Self { stops: vec![Vec::new(); curves.len()], curves, nodes: Vec::new() };
+        found.cross();
+        found
+    }
+
+    /// Nodes where curves cross, and at all ends.
+    fn cross(&mut self) {
+        let crossings = crossings(&self.curves);
+        for (place, on) in crossings {
+            let node = self.node(place, on.iter().map(|&(curve, _)| curve));
+            for (curve, length) in on {
+                self.stops[curve].push((length, node));
+            }
+        }
+        for curve in 0..self.curves.len() {
+            let Curve { places, ends, .. } = &self.curves[curve];
+            if ends[0] == End::Closed {
+                continue;
+            }
+            let ends = [(0.0, places[0]), (length_of(places), places[places.len() - 1])];
+            for (length, place) in ends {
+                let node = self.node(place, [curve].into_iter());
+                self.stops[curve].push((length, node));
+            }
+        }
+        for stops in &mut self.stops {
+            stops.sort_by(|a, b| a.0.total_cmp(&b.0));
+            stops.dedup_by(|a, b| a.1 == b.1 && (a.0 - b.0).abs() < 1e-6);
+        }
+    }
+
+    /// A node at a place: one that is there already, or a new one.
+    fn node(&mut self, place: Point<D>, curves: impl Iterator<Item = usize>) -> u32 {
+        let near = self.nodes.iter().position(|n| distance_squared(&n.place, &place) < 0.25);
+        let at = near.unwrap_or_else(|| {
+            self.nodes.push(Node { place, pieces: Vec::new() });
+            self.nodes.len() - 1
+        });
+        for curve in curves {
+            let Curve { piece, cut, .. } = self.curves[curve];
+            let other = if let Cut::Piece(other) = cut { Some(other) } else { None };
+            for piece in [Some(piece), other].into_iter().flatten() {
+                if !self.nodes[at].pieces.contains(&piece) {
+                    self.nodes[at].pieces.push(piece);
+                }
+            }
+        }
+        at as u32
+    }
+
+    /// Atoms on the curves: one on each node, and evenly at ∫ds/d between them.
+    pub fn atoms(&self, distance: &NominalDistance<D>) -> Vec<FeatureAtom<D>> {
+        let mut atoms: Vec<FeatureAtom<D>> = (self.nodes.iter())
+            .map(|node| FeatureAtom::new(node.place, node.pieces.clone(), 0))
+            .collect();
+        for (curve, stops) in self.curves.iter().zip(&self.stops) {
+            let lengths = Lengths::of(&curve.places, distance);
+            let mut pieces = vec![curve.piece];
+            if let Cut::Piece(other) = curve.cut {
+                pieces.push(other);
+            }
+            let mut add = |from: f64, to: f64, count: usize| {
+                for i in 1..count {
+                    let at = from + (to - from) * i as f64 / count as f64;
+                    let place = lengths.place(&curve.places, at);
+                    atoms.push(FeatureAtom::new(place, pieces.clone(), 1));
+                }
+            };
+            let all = lengths.scaled[lengths.scaled.len() - 1];
+            if stops.is_empty() {
+                // closed: an atom where it begins
+                let count = (all.round() as usize).max(3);
+                add(-all / count as f64, all, count + 1);
+                continue;
+            }
+            let at: Vec<f64> = stops.iter().map(|stop| lengths.scaled_at(stop.0)).collect();
+            let mut parts: Vec<(f64, f64)> = at.windows(2).map(|w| (w[0], w[1])).collect();
+            if curve.ends[0] == End::Closed {
+                parts.push((at[at.len() - 1], all + at[0]));
+            }
+            for (from, to) in parts {
+                add(from, to, ((to - from).round() as usize).max(1));
+            }
+        }
+        atoms
+    }
+}
+
+/// All curves of all pieces, the strongest pieces first.
+fn traced<const D: usize>(
+    pieces: &Pieces<D>,
+    bounds: &Bounds<D>,
+    distance: &NominalDistance<D>,
+) -> Vec<Curve<D>> {
+    let tracer = Tracer { pieces, bounds: *bounds };
+    let mut curves: Vec<Curve<D>> = Vec::new();
+    for cut in cuts::<D>(bounds) {
+        follow_all(&tracer, cut, distance, &mut curves);
+    }
+    if D > 2 {
+        for other in 0..pieces.len() as u32 {
+            follow_all(&tracer, Cut::Piece(other), distance, &mut curves);
+        }
+    }
+    curves
+}
+
+/// What makes curves, but for other pieces.
+fn cuts<const D: usize>(bounds: &Bounds<D>) -> Vec<Cut> {
+    if D == 2 {
+        return vec![Cut::None];
+    }
+    let sides = (0..D).flat_map(|axis| [(axis, bounds.min[axis]), (axis, bounds.max[axis])]);
+    sides.map(|(axis, level)| Cut::Side { axis, level }).collect()
+}
+
+/// Follows every curve of a kind that no curve before it goes along.
+fn follow_all<const D: usize>(
+    tracer: &Tracer<'_, D>,
+    cut: Cut,
+    distance: &NominalDistance<D>,
+    curves: &mut Vec<Curve<D>>,
+) {
+    let (pieces, step) = (tracer.pieces, tracer.pieces.step());
+    let is_near = |p: &Point<D>, piece: u32| match cut {
+        Cut::None => true,
+        Cut::Side { axis, level } => (p[axis] - level).abs() <= 1.5 * step,
+        Cut::Piece(other) => {
+            piece < other
+                && pieces
+                    .foot_on(other, p, 2.0 * step)
+                    .is_some_and(|foot| foot.beyond == 0.0 && foot.signed_distance(p).abs() < step)
+        }
+    };
+    let count = pieces.points().len();
+    let mut walked = Bins::new(&tracer.bounds, step, count);
+    let mut walked_places: Vec<(Point<D>, u32)> = Vec::new();
+    for (point, piece) in pieces.points() {
+        if !is_near(&point.position, piece) {
+            continue;
+        }
+        let Some((start, _)) = tracer.onto(piece, cut, &point.position) else { continue };
+        if distance_squared(&start, &point.position) > 9.0 * step * step {
+            continue;
+        }
+        let mut is_walked = false;
+        walked.near(&start, 1.5 * step, |i| {
+            let (place, on) = &walked_places[i];
+            is_walked |= *on == piece && distance_squared(place, &start) < (1.5 * step).powi(2);
+        });
+        if is_walked {
+            continue;
+        }
+        let Some(curve) = tracer.curve(piece, cut, &start) else { continue };
+        for place in &curve.places {
+            walked.push(place);
+            walked_places.push((*place, piece));
+        }
+        if length_of(&curve.places) >= LEAST_LENGTH * distance.at(&start) {
+            curves.push(curve);
+        }
+    }
+}
+
+/// The length of a line of places.
+fn length_of<const D: usize>(places: &[Point<D>]) -> f64 {
+    places.windows(2).map(|w| distance_squared(&w[0], &w[1]).sqrt()).sum()
+}
+
+/// Free ends that are near another curve are led onto it.
+fn join_ends<const D: usize>(
+    curves: &mut [Curve<D>],
+    pieces: &Pieces<D>,
+    distance: &NominalDistance<D>,
+) {
+    for curve in 0..curves.len() {
+        for end in 0..2 {
+            if curves[curve].ends[end] != End::Free {
+                continue;
+            }
+            let places = &curves[curve].places;
+            let place = if end == 0 { places[0] } else { places[places.len() - 1] };
+            let reach = JOIN * distance.at(&place) + 2.0 * pieces.step();
+            let Some(to) = nearest_on_others(curves, curve, &place, reach) else { continue };
+            // a little beyond, so that the two cross
+            let over = std::array::from_fn(|k| to[k] + 1e-3 * (to[k] - place[k]));
+            if end == 0 {
+                curves[curve].places.insert(0, over);
+            } else {
+                curves[curve].places.push(over);
+            }
+        }
+    }
+}
+
+/// The place on another curve of the same kind nearest to `p`.
+fn nearest_on_others<const D: usize>(
+    curves: &[Curve<D>],
+    own: usize,
+    p: &Point<D>,
+    reach: f64,
+) -> Option<Point<D>> {
+    let mut best = (reach * reach, None);
+    for (other, curve) in curves.iter().enumerate() {
+        if other == own || curve.cut != curves[own].cut {
+            continue;
+        }
+        for pair in curve.places.windows(2) {
+            let foot = foot_on_line(p, &pair[0], &pair[1]).1;
+            let squared = distance_squared(&foot, p);
+            if squared < best.0 {
+                best = (squared, Some(foot));
+            }
+        }
+    }
+    best.1
+}
+
+/// The share along a line and the place on it that are nearest to `p`.
+fn foot_on_line<const D: usize>(p: &Point<D>, a: &Point<D>, b: &Point<D>) -> (f64, Point<D>) {
+    let along = difference(b, a);
+    let squared = dot(&along, &along);
+    let t = if squared > 0.0 { dot(&difference(p, a), &along) / squared } else { 0.0 };
+    let t = t.clamp(0.0, 1.0);
+    (t, std::array::from_fn(|k| a[k] + t * along[k]))
+}
+
+/// A crossing: where, and at which length of which curves.
+type Crossing<const D: usize> = (Point<D>, Vec<(usize, f64)>);
+
+/// Where lines of places cross, or, in space, pass within half a sample of each other.
+fn crossings<const D: usize>(curves: &[Curve<D>]) -> Vec<Crossing<D>> {
+    let mut found: Vec<Crossing<D>> = Vec::new();
+    let boxes: Vec<Option<Bounds<D>>> = curves.iter().map(|c| Bounds::of(&c.places)).collect();
+    let overlap = |a: &Bounds<D>, b: &Bounds<D>| {
+        (0..D).all(|k| a.min[k] <= b.max[k] + 1.0 && b.min[k] <= a.max[k] + 1.0)
+    };
+    for a in 0..curves.len() {
+        for b in a + 1..curves.len() {
+            let (Some(box_a), Some(box_b)) = (&boxes[a], &boxes[b]) else { continue };
+            if overlap(box_a, box_b) {
+                cross_two(curves, a, b, &mut found);
+            }
+        }
+    }
+    found
+}
+
+fn cross_two<const D: usize>(
+    curves: &[Curve<D>],
+    a: usize,
+    b: usize,
+    found: &mut Vec<Crossing<D>>,
+) {
+    let mut at_a = 0.0;
+    for pair in curves[a].places.windows(2) {
+        let length_a = distance_squared(&pair[0], &pair[1]).sqrt();
+        let mut at_b = 0.0;
+        for other in curves[b].places.windows(2) {
+            let length_b = distance_squared(&other[0], &other[1]).sqrt();
+            if let Some((s, t, place)) = meeting([&pair[0], &pair[1]], [&other[0], &other[1]]) {
+                found.push((place, vec![(a, at_a + s * length_a), (b, at_b + t * length_b)]));
+            }
+            at_b += length_b;
+        }
+        at_a += length_a;
+    }
+}
+
+/// Where two short lines meet: the shares along them, and the place.
+fn meeting<const D: usize>(
+    [a, b]: [&Point<D>; 2],
+    [c, d]: [&Point<D>; 2],
+) -> Option<(f64, f64, Point<D>)> {
+    let (u, v, w) = (difference(b, a), difference(d, c), difference(c, a));
+    if (0..D)
+        .any(|k| a[k].max(b[k]) + 0.5 < c[k].min(d[k]) || c[k].max(d[k]) + 0.5 < a[k].min(b[k]))
+    {
+        return None;
+    }
+    let (uu, vv, uv) = (dot(&u, &u), dot(&v, &v), dot(&u, &v));
+    let determinant = uu * vv - uv * uv;
+    if determinant <= 1e-12 * uu * vv {
+        return None;
+    }
+    let s = (dot(&u, &w) * vv - dot(&v, &w) * uv) / determinant;
+    let t = (dot(&u, &w) * uv - dot(&v, &w) * uu) / determinant;
+    if !(0.0..1.0).contains(&s) || !(0.0..1.0).contains(&t) {
+        return None;
+    }
+    let p: Point<D> = std::array::from_fn(|k| a[k] + s * u[k]);
+    let q: Point<D> = std::array::from_fn(|k| c[k] + t * v[k]);
+    let near = if D == 2 { f64::INFINITY } else { 0.25 };
+    (distance_squared(&p, &q) < near).then(|| (s, t, std::array::from_fn(|k| 0.5 * (p[k] + q[k]))))
+}
+
+/// The length along a line of places, and the same over d.
+struct Lengths {
+    plain: Vec<f64>,
+    scaled: Vec<f64>,
+}
+
+impl Lengths {
+    fn of<const D: usize>(places: &[Point<D>], distance: &NominalDistance<D>) -> Self {
+        let (mut plain, mut scaled) = (vec![0.0], vec![0.0]);
+        for pair in places.windows(2) {
+            let length = distance_squared(&pair[0], &pair[1]).sqrt();
+            let middle = std::array::from_fn(|k| 0.5 * (pair[0][k] + pair[1][k]));
+            plain.push(plain[plain.len() - 1] + length);
+            scaled.push(scaled[scaled.len() - 1] + length / distance.at(&middle));
+        }
+        Self { plain, scaled }
+    }
+
+    /// The scaled length at a plain one.
+    fn scaled_at(&self, length: f64) -> f64 {
+        between(&self.plain, &self.scaled, length)
+    }
+
+    /// The place at a scaled length; beyond the last one it begins again.
+    fn place<const D: usize>(&self, places: &[Point<D>], scaled: f64) -> Point<D> {
+        let all = self.scaled[self.scaled.len() - 1];
+        let at = scaled.rem_euclid(all);
+        let i = self.scaled.partition_point(|&x| x <= at).clamp(1, self.scaled.len() - 1);
+        let (low, high) = (self.scaled[i - 1], self.scaled[i]);
+        let share = if high > low { (at - low) / (high - low) } else { 0.0 };
+        std::array::from_fn(|k| places[i - 1][k] + share * (places[i][k] - places[i - 1][k]))
+    }
+}
+
+/// The value at `x` of what is linear between (from, to).
+fn between(from: &[f64], to: &[f64], x: f64) -> f64 {
+    let i = from.partition_point(|&y| y <= x).clamp(1, from.len() - 1);
+    let (low, high) = (from[i - 1], from[i]);
+    let share = if high > low { (x - low) / (high - low) } else { 0.0 };
+    to[i - 1] + share * (to[i] - to[i - 1])
+}
