@@ -25,6 +25,8 @@ pub(super) struct Curves<const D: usize> {
     /// For each curve the nodes on it, by the length at which they are.
     stops: Vec<Vec<(f64, u32)>>,
     nodes: Vec<Node<D>>,
+    /// The mean step of the image.
+    step: f64,
 }
 
 impl<const D: usize> Curves<D> {
@@ -32,7 +34,8 @@ impl<const D: usize> Curves<D> {
     pub fn of(pieces: &Pieces<D>, bounds: &Bounds<D>, distance: &NominalDistance<D>) -> Self {
         let mut curves = traced(pieces, bounds, distance);
         join_ends(&mut curves, pieces, distance);
-        let mut found = Self { stops: vec![Vec::new(); curves.len()], curves, nodes: Vec::new() };
+        let stops = vec![Vec::new(); curves.len()];
+        let mut found = Self { stops, curves, nodes: Vec::new(), step: pieces.step() };
         found.cross();
         found
     }
@@ -65,7 +68,8 @@ impl<const D: usize> Curves<D> {
 
     /// A node at a place: one that is there already, or a new one.
     fn node(&mut self, place: Point<D>, curves: impl Iterator<Item = usize>) -> u32 {
-        let near = self.nodes.iter().position(|n| distance_squared(&n.place, &place) < 0.25);
+        let near = (0.5 * self.step).powi(2);
+        let near = self.nodes.iter().position(|n| distance_squared(&n.place, &place) < near);
         let at = near.unwrap_or_else(|| {
             self.nodes.push(Node { place, pieces: Vec::new() });
             self.nodes.len() - 1

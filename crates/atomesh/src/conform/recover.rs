@@ -14,6 +14,10 @@ use super::facets::pieces_at;
 const CLEAR: f64 = 0.45;
 /// New atoms are as far as this from each other, over d.
 const THINNED: f64 = 0.6;
+/// An end of an edge nearer to a piece than this is brought onto it, over d.
+const BROUGHT: f64 = 1.0 / 3.0;
+/// A new atom at a crossing is as far as this from all others, over d.
+const ALONE: f64 = 0.3;
 /// An end of an edge within this of a piece is on it, in mean steps.
 const ON: f64 = 0.1;
 
@@ -82,8 +86,9 @@ pub(super) fn crossings<const D: usize>(mesh: &Mesh<D>, pieces: &Pieces<D>) -> V
     edges.par_iter().with_min_len(1 << 8).filter_map(crossing).collect()
 }
 
-/// Puts atoms at crossings that are far enough from the piece's atoms; where none is, takes away the free ends nearer
-/// to the pieces. Gives the lattice and whether it has changed.
+/// Brings free ends of crossing edges that are near onto the piece, or puts atoms at the crossings, where they are far
+/// enough from the piece's atoms; where nothing can be brought or put, takes away the free ends nearer to the pieces.
+/// Gives the lattice and whether it has changed.
 pub(super) fn recovered<const D: usize>(
     mut lattice: Lattice<D>,
     crossings: &[Crossing<D>],
@@ -92,35 +97,51 @@ pub(super) fn recovered<const D: usize>(
 ) -> (Lattice<D>, bool) {
     let bounds = *lattice.bounds();
     let of_atoms = pieces_at(lattice.atoms(), pieces);
-    let mut bins = Bins::new(&bounds, distance.least(), lattice.len());
-    let mut on: Vec<(Point<D>, Vec<u32>, bool)> = Vec::new();
-    for (atom, pieces) in lattice.atoms().iter().zip(&of_atoms) {
-        if !pieces.is_empty() {
-            bins.push(atom);
-            on.push((*atom, pieces.clone(), false));
+    let all = Bins::of(&bounds, distance.least(), lattice.atoms().iter().copied());
+    let mut on = OnPieces::new(&lattice, &of_atoms, distance);
+    let mut is_touched = vec![false; lattice.len()];
+    let mut atoms = lattice.atoms().to_vec();
+    let mut new: Vec<Point<D>> = Vec::new();
+    for Crossing { ends, heights, piece, place } in crossings {
+        let d = distance.at(place);
+        let nearer = usize::from(heights[1].abs() < heights[0].abs());
+        let end = ends[nearer] as usize;
+        if ends.iter().any(|&end| is_touched[end as usize]) {
+            continue;
         }
-    }
-    let mut is_changed = false;
-    for crossing in crossings {
-        let d = distance.at(&crossing.place);
-        let mut is_free = true;
-        bins.near(&crossing.place, THINNED * d, |i| {
-            let (place, pieces, is_new) = &on[i];
-            let least = match (is_new, pieces.contains(&crossing.piece)) {
-                (true, true) => THINNED,
-                _ => CLEAR,
-            };
-            is_free &= distance_squared(place, &crossing.place) >= (least * d).powi(2);
+        let is_inner = lattice.freedom_in_box(end).count_ones() as usize == D;
+        if lattice.temperature(end) > 0.0 && is_inner && heights[nearer].abs() < BROUGHT * d {
+            let foot = pieces.foot_on(*piece, &atoms[end], d);
+            let to = foot.filter(|foot| foot.beyond == 0.0).map(|foot| foot.position);
+            let to = to.filter(|to| bounds.freedom(to).count_ones() as usize == D);
+            if let Some(to) = to.filter(|to| bounds.contains(to) && on.is_clear(to, *piece, d)) {
+                on.add(&to, *piece);
+                (atoms[end], is_touched[end]) = (to, true);
+                continue;
+            }
+        }
+        let place = bounds.clamp(place);
+        let mut is_alone = true;
+        all.near(&place, ALONE * d, |i| {
+            is_alone &= distance_squared(&lattice.atoms()[i], &place) >= (ALONE * d).powi(2);
         });
-        if is_free {
-            let place = bounds.clamp(&crossing.place);
-            bins.push(&place);
-            on.push((place, vec![crossing.piece], true));
-            lattice.push(place, bounds.freedom(&place), 0.0);
-            is_changed = true;
+        if is_alone && on.is_clear(&place, *piece, d) {
+            on.add(&place, *piece);
+            ends.iter().for_each(|&end| is_touched[end as usize] = true);
+            new.push(place);
         }
     }
-    if is_changed {
+    if is_touched.contains(&true) {
+        lattice = lattice.moved_to(atoms);
+        for (i, &is_touched) in is_touched.iter().enumerate() {
+            if is_touched && pieces_at(&lattice.atoms()[i..=i], pieces)[0].is_empty() {
+                continue; // an end of an edge with a new atom
+            }
+            if is_touched {
+                lattice.set_temperature(i, 0.0);
+            }
+        }
+        new.iter().for_each(|place| lattice.push(*place, bounds.freedom(place), 0.0));
         return (lattice, true);
     }
     let mut goes = vec![false; lattice.len()];
@@ -135,8 +156,45 @@ pub(super) fn recovered<const D: usize>(
         let end = [ends[nearer], ends[1 - nearer]].into_iter().find(|&end| may_go(end));
         if let Some(end) = end {
             goes[end as usize] = true;
-            is_changed = true;
         }
     }
+    let is_changed = goes.contains(&true);
     (lattice.retained(|i| !goes[i]), is_changed)
+}
+
+/// The atoms on pieces.
+struct OnPieces<const D: usize> {
+    bins: Bins<D>,
+    /// Where they are, on which pieces, and whether they are new.
+    atoms: Vec<(Point<D>, Vec<u32>, bool)>,
+}
+
+impl<const D: usize> OnPieces<D> {
+    fn new(lattice: &Lattice<D>, of_atoms: &[Vec<u32>], distance: &NominalDistance<D>) -> Self {
+        let mut bins = Bins::new(lattice.bounds(), distance.least(), lattice.len());
+        let mut atoms = Vec::new();
+        for (atom, pieces) in lattice.atoms().iter().zip(of_atoms) {
+            if !pieces.is_empty() {
+                bins.push(atom);
+                atoms.push((*atom, pieces.clone(), false));
+            }
+        }
+        Self { bins, atoms }
+    }
+
+    /// Whether a new atom of a piece is far enough from all others on pieces.
+    fn is_clear(&self, place: &Point<D>, piece: u32, d: f64) -> bool {
+        let mut is_clear = true;
+        self.bins.near(place, THINNED * d, |i| {
+            let (other, pieces, is_new) = &self.atoms[i];
+            let least = if *is_new && pieces.contains(&piece) { THINNED } else { CLEAR };
+            is_clear &= distance_squared(other, place) >= (least * d).powi(2);
+        });
+        is_clear
+    }
+
+    fn add(&mut self, place: &Point<D>, piece: u32) {
+        self.bins.push(place);
+        self.atoms.push((*place, vec![piece], true));
+    }
 }

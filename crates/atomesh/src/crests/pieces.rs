@@ -22,15 +22,31 @@ const LINK: f64 = 1.2;
 const SUPPORT: f64 = 4.0;
 /// The least share of the points near a point that lie on its plane.
 const LEAST_SUPPORT: f64 = 0.7;
+/// Points of one feature near each other have normals with at least this cosine, 21°.
+const ALIKE: f64 = 0.93;
+/// Points with other normals within this, in mean steps, are of a feature that meets the point's own.
+const NEXT: f64 = 2.0;
+/// The fewest points on a point's plane, itself among them, in the plane; twice as many in space.
+const LEAST_ON: usize = 4;
+/// How far the ends of pieces on one line or plane may be apart where no features meet, in mean steps.
+const GAP: f64 = 5.0;
+/// An end has its neighbours on one side: their mean is farther than this, in mean steps.
+const LOPSIDED: f64 = 1.2;
 /// How far pieces on one line or plane may be apart and still be joined, in mean steps.
-const BRIDGE: f64 = 8.0;
+const BRIDGE: f64 = 16.0;
+/// How far from where features meet the ends of pieces are, in mean steps.
+const NEAR_MEETING: f64 = 6.0;
+/// How far the points between joined pieces are apart, in mean steps.
+const FILL: f64 = 0.8;
 /// The deviation of the weights of a fit, and the radius of its points, in mean steps.
 const FIT_WIDTH: f64 = 1.3;
 const FIT_REACH: f64 = 3.25;
 /// How often a foot is improved.
 const FOOT_ROUNDS: usize = 3;
-/// How far from the nearest point of a piece a place may be along the piece and still be on it, in mean steps.
+/// How far from the nearest point of a piece a place may be along the piece and still be on it, in mean steps: in the
+/// image, and within this of the image's sides, where filters see too little.
 const END: f64 = 1.2;
+const END_AT_SIDE: f64 = 4.0;
 
 /// Pieces of features, in lattice coordinates.
 #[derive(Clone, Debug)]
@@ -41,6 +57,7 @@ pub struct Pieces<const D: usize> {
     /// The mean strength of each piece.
     strengths: Vec<f64>,
     bins: Bins<D>,
+    bounds: Bounds<D>,
     /// The mean step of the image.
     step: f64,
 }
@@ -71,8 +88,8 @@ impl<const D: usize> Pieces<D> {
     pub fn new(points: Vec<FeaturePoint<D>>, grid: &Grid<D>, least_count: usize) -> Self {
         let step = grid.step.iter().sum::<f64>() / D as f64;
         let bounds = grid.bounds();
-        let mut points = supported(points, &bounds, step);
-        points.sort_by(|a, b| a.index.cmp(&b.index));
+        let (mut points, meetings) = supported(points, &bounds, step);
+        points.sort_by_key(|point| point.index);
         let diagonal = LINK * dot(&grid.step, &grid.step).sqrt();
         let bins = Bins::of(&bounds, step, points.iter().map(|point| point.position));
         let mut sets = Sets::new(points.len());
@@ -94,20 +111,12 @@ impl<const D: usize> Pieces<D> {
             all.iter().for_each(|&j| sets.join(i as u32, j));
         });
         let roots = sets.roots();
-        let reach = BRIDGE * step;
-        let bridges: Vec<Vec<u32>> = (0..points.len())
-            .into_par_iter()
-            .with_min_len(1 << 8)
-            .map(|i| {
-                near(i, reach, &|j| {
-                    roots[i] != roots[j] && are_in_line(&points[i], &points[j], reach, step)
-                })
-            })
-            .collect();
-        bridges.iter().enumerate().for_each(|(i, all)| {
-            all.iter().for_each(|&j| sets.join(i as u32, j));
-        });
+        let bridges = bridges(&points, &roots, &meetings, &bounds, step);
+        for &[i, j] in &bridges {
+            sets.join(i, j);
+        }
         turn(&mut points, &links, &bridges);
+        fill(&mut points, &mut sets, &bridges, &bounds, step);
         Self::of_sets(points, &mut sets, &bounds, step, least_count)
     }
 
@@ -140,7 +149,7 @@ impl<const D: usize> Pieces<D> {
             .filter(|(_, piece)| *piece != u32::MAX)
             .unzip();
         let bins = Bins::of(bounds, step, points.iter().map(|point| point.position));
-        Self { points, of_points, strengths, bins, step }
+        Self { points, of_points, strengths, bins, bounds: *bounds, step }
     }
 
     /// How many pieces there are.
@@ -221,15 +230,24 @@ impl<const D: usize> Pieces<D> {
             let height = dot(&difference(p, &position), &normal);
             let x: Point<D> = std::array::from_fn(|k| p[k] - height * normal[k]);
             let along = distance_squared(&x, &point.position).sqrt();
-            beyond = (self.gap(piece, &x, along) - END * self.step).max(0.0);
+            let gap = self.gap(piece, &x, along);
+            beyond = (gap - self.end_at(&x)).max(0.0);
             if beyond > 0.0 {
                 // the plane at the end goes on
                 position = x;
                 break;
             }
-            (position, normal) = self.fit(piece, &x, &normal)?;
+            (position, normal) = self.fit(piece, &x, &normal, gap)?;
         }
         Some(Foot { position, normal, piece, beyond })
+    }
+
+    /// How far from its nearest point a piece still is at `x`.
+    fn end_at(&self, x: &Point<D>) -> f64 {
+        let near = END_AT_SIDE * self.step;
+        let is_at_side =
+            (0..D).any(|k| x[k] < self.bounds.min[k] + near || x[k] > self.bounds.max[k] - near);
+        self.step * if is_at_side { END_AT_SIDE } else { END }
     }
 
     /// How far `x` is from the nearest point of a piece; at most `known`.
@@ -241,10 +259,18 @@ impl<const D: usize> Pieces<D> {
         found.map_or(known, |i| distance_squared(&self.points[i].position, x).sqrt())
     }
 
-    /// The piece near `x`: the place straight above or below it, and the normal there.
-    fn fit(&self, piece: u32, x: &Point<D>, normal: &Point<D>) -> Option<(Point<D>, Point<D>)> {
-        let reach = FIT_REACH * self.step;
-        let inverse = 1.0 / (FIT_WIDTH * self.step).powi(2);
+    /// The piece near `x`, whose nearest point is `gap` away: the place straight above or below `x`, and the normal there.
+    fn fit(
+        &self,
+        piece: u32,
+        x: &Point<D>,
+        normal: &Point<D>,
+        gap: f64,
+    ) -> Option<(Point<D>, Point<D>)> {
+        let is_beside = gap > END * self.step; // beyond the last point, near a side of the box
+        let extra = if is_beside { gap } else { 0.0 };
+        let reach = FIT_REACH * self.step + extra;
+        let inverse = 1.0 / (FIT_WIDTH * self.step + extra).powi(2);
         let axes = tangents(normal);
         let size = D * (D + 1) / 2;
         let mut matrix = [[0.0; 6]; 6];
@@ -273,7 +299,7 @@ impl<const D: usize> Pieces<D> {
         });
         let size = match count {
             0 => return None,
-            n if n >= 2 * size => size,
+            n if n >= 2 * size && !is_beside => size,
             n if n > D => D,
             _ => 1,
         };
@@ -324,32 +350,43 @@ pub(crate) fn tangents<const D: usize>(normal: &Point<D>) -> [Point<D>; 2] {
     [first, second]
 }
 
-/// The points most of whose neighbours lie on their planes.
+/// The points most of whose neighbours lie on their planes, and the places of the others.
 fn supported<const D: usize>(
     points: Vec<FeaturePoint<D>>,
     bounds: &Bounds<D>,
     step: f64,
-) -> Vec<FeaturePoint<D>> {
+) -> (Vec<FeaturePoint<D>>, Vec<Point<D>>) {
     let bins = Bins::of(bounds, step, points.iter().map(|point| point.position));
     let reach = SUPPORT * step;
     let is_supported = |point: &FeaturePoint<D>| {
-        let (mut on, mut all) = (0usize, 0usize);
+        let (mut on, mut all, mut others) = (0usize, 0usize, 0usize);
         bins.near(&point.position, reach, |j| {
             let offset = difference(&points[j].position, &point.position);
             let squared = dot(&offset, &offset);
             if squared > reach * reach {
                 return;
             }
+            if dot(&points[j].normal, &point.normal).abs() < ALIKE {
+                // of another feature, or around a bend
+                others += usize::from(squared <= (NEXT * step).powi(2));
+                return;
+            }
             all += 1;
             let height = dot(&offset, &point.normal).abs();
-            let is_on = height <= 0.25 * squared.sqrt() + 0.35 * step;
-            on += usize::from(is_on && dot(&points[j].normal, &point.normal).abs() > 0.85);
+            on += usize::from(height <= 0.12 * squared.sqrt() + 0.3 * step);
         });
-        on as f64 >= LEAST_SUPPORT * all as f64
+        on >= LEAST_ON * (D - 1) && others == 0 && on as f64 >= LEAST_SUPPORT * all as f64
     };
     let is_kept: Vec<bool> = points.par_iter().with_min_len(1 << 8).map(is_supported).collect();
-    let kept = points.into_iter().zip(is_kept);
-    kept.filter(|(_, is_kept)| *is_kept).map(|(point, _)| point).collect()
+    let (mut kept, mut others) = (Vec::new(), Vec::new());
+    for (point, is_kept) in points.into_iter().zip(is_kept) {
+        if is_kept {
+            kept.push(point);
+        } else {
+            others.push(point.position);
+        }
+    }
+    (kept, others)
 }
 
 /// Whether neighbouring points are of one piece.
@@ -368,6 +405,131 @@ fn are_linked<const D: usize>(
     height <= 0.4 * squared.sqrt() + 0.35 * step
 }
 
+/// Pairs of points, the first the lower, of pieces that go on in each other where features meet: each point near such
+/// a place with the nearest one in line with it across.
+fn bridges<const D: usize>(
+    points: &[FeaturePoint<D>],
+    roots: &[u32],
+    meetings: &[Point<D>],
+    bounds: &Bounds<D>,
+    step: f64,
+) -> Vec<[u32; 2]> {
+    let meeting_bins = Bins::of(bounds, step, meetings.iter().copied());
+    let is_end = |point: &FeaturePoint<D>| {
+        let (reach, mut found) = (NEAR_MEETING * step, false);
+        meeting_bins.near(&point.position, reach, |i| {
+            found |= distance_squared(&meetings[i], &point.position) <= reach * reach;
+        });
+        found
+    };
+    let is_at_meeting: Vec<bool> = points.par_iter().with_min_len(1 << 8).map(is_end).collect();
+    let bins = Bins::of(bounds, step, points.iter().map(|point| point.position));
+    let is_lopsided = |i: usize| {
+        let (mut sum, mut count) = ([0.0; D], 0.0);
+        bins.near(&points[i].position, SUPPORT * step, |j| {
+            let offset = difference(&points[j].position, &points[i].position);
+            if roots[i] == roots[j] && dot(&offset, &offset) <= (SUPPORT * step).powi(2) {
+                (0..D).for_each(|k| sum[k] += offset[k]);
+                count += 1.0;
+            }
+        });
+        dot(&sum, &sum).sqrt() > LOPSIDED * step * count
+    };
+    let ends: Vec<u32> = (0..points.len() as u32)
+        .into_par_iter()
+        .with_min_len(1 << 8)
+        .filter(|&i| is_at_meeting[i as usize] || is_lopsided(i as usize))
+        .collect();
+    let even = |&i: &u32| evened(i as usize, points, roots, &bins, step);
+    let evened: Vec<FeaturePoint<D>> = ends.par_iter().with_min_len(1 << 6).map(even).collect();
+    let end_bins = Bins::of(bounds, 2.0 * step, evened.iter().map(|point| point.position));
+    let across = |at: usize| {
+        let (own, point) = (ends[at], &evened[at]);
+        let reach = step * if is_at_meeting[own as usize] { BRIDGE } else { GAP };
+        let mut best = (reach * reach, None);
+        end_bins.near(&point.position, reach, |j| {
+            let other = ends[j];
+            let found = (distance_squared(&evened[j].position, &point.position), Some(other));
+            if roots[own as usize] != roots[other as usize]
+                && found < best
+                && are_in_line(point, &evened[j], reach, step)
+            {
+                best = found;
+            }
+        });
+        best.1.map(|other| [own.min(other), own.max(other)])
+    };
+    let mut found: Vec<[u32; 2]> =
+        (0..ends.len()).into_par_iter().with_min_len(1 << 6).filter_map(across).collect();
+    found.sort_unstable();
+    found.dedup();
+    found
+}
+
+/// A point with the mean of the normals of its piece near it.
+fn evened<const D: usize>(
+    i: usize,
+    points: &[FeaturePoint<D>],
+    roots: &[u32],
+    bins: &Bins<D>,
+    step: f64,
+) -> FeaturePoint<D> {
+    let (point, reach) = (points[i], SUPPORT * step);
+    let mut sum = [0.0; D];
+    bins.near(&point.position, reach, |j| {
+        let cosine = dot(&points[j].normal, &point.normal);
+        let is_near = distance_squared(&points[j].position, &point.position) <= reach * reach;
+        if is_near && roots[i] == roots[j] && cosine.abs() > 0.85 {
+            (0..D).for_each(|k| sum[k] += cosine.signum() * points[j].normal[k]);
+        }
+    });
+    let length = dot(&sum, &sum).sqrt();
+    FeaturePoint { normal: sum.map(|x| x / length), ..point }
+}
+
+/// Adds points between joined pieces, in the sets of the pieces.
+fn fill<const D: usize>(
+    points: &mut Vec<FeaturePoint<D>>,
+    sets: &mut Sets,
+    bridges: &[[u32; 2]],
+    bounds: &Bounds<D>,
+    step: f64,
+) {
+    let spacing = FILL * step;
+    let mut bins = Bins::of(bounds, step, points.iter().map(|point| point.position));
+    for &[i, j] in bridges {
+        let (a, b) = (points[i as usize], points[j as usize]);
+        let length = distance_squared(&a.position, &b.position).sqrt();
+        let count = (length / spacing) as usize + 1;
+        for n in 1..count {
+            let t = n as f64 / count as f64;
+            let mix = |x: &Point<D>, y: &Point<D>| -> Point<D> {
+                std::array::from_fn(|k| (1.0 - t) * x[k] + t * y[k])
+            };
+            let (position, normal) = (mix(&a.position, &b.position), mix(&a.normal, &b.normal));
+            let length = dot(&normal, &normal).sqrt();
+            let normal = normal.map(|x| x / length);
+            let mut is_free = true;
+            let root = sets.root(i);
+            bins.near(&position, spacing, |k| {
+                is_free &= distance_squared(&points[k].position, &position) >= spacing * spacing
+                    || sets.root(k as u32) != root;
+            });
+            if is_free {
+                bins.push(&position);
+                sets.push();
+                sets.join(i, points.len() as u32);
+                points.push(FeaturePoint {
+                    index: a.index,
+                    position,
+                    normal,
+                    strength: (1.0 - t) * a.strength + t * b.strength,
+                });
+            }
+        }
+    }
+}
+
 /// Whether points of two pieces lie on one line or plane.
 fn are_in_line<const D: usize>(
     a: &FeaturePoint<D>,
@@ -381,17 +543,17 @@ fn are_in_line<const D: usize>(
         return false;
     }
     let height = dot(&offset, &a.normal).abs().max(dot(&offset, &b.normal).abs());
-    height <= 0.1 * squared.sqrt() + 0.35 * step
+    height <= 0.08 * squared.sqrt() + 0.4 * step
 }
 
 /// Turns the normals of linked points to the same side, from the first point of each piece on.
-fn turn<const D: usize>(points: &mut [FeaturePoint<D>], links: &[Vec<u32>], bridges: &[Vec<u32>]) {
+fn turn<const D: usize>(points: &mut [FeaturePoint<D>], links: &[Vec<u32>], bridges: &[[u32; 2]]) {
     let mut around = vec![Vec::new(); points.len()];
-    for (i, all) in links.iter().enumerate().chain(bridges.iter().enumerate()) {
-        for &j in all {
-            around[i].push(j);
-            around[j as usize].push(i as u32);
-        }
+    let links = links.iter().enumerate();
+    let links = links.flat_map(|(i, all)| all.iter().map(move |&j| [i as u32, j]));
+    for [i, j] in links.chain(bridges.iter().copied()) {
+        around[i as usize].push(j);
+        around[j as usize].push(i);
     }
     let mut is_turned = vec![false; points.len()];
     let mut next = VecDeque::new();
