@@ -16,6 +16,10 @@ const APART: f64 = 0.45;
 const FIRST: f64 = 0.75;
 /// The least distance of atoms on a surface once they have settled, over d.
 const SETTLED: f64 = 0.55;
+/// The least distance of atoms on surfaces from the sides of the box, over d.
+const SIDE: f64 = 0.4;
+/// An atom nearer to a side of the box than this is on it, in mean steps.
+const ON_SIDE: f64 = 0.05;
 /// How often atoms on surfaces are moved by the pair force, and how far at most each time, over d.
 const ROUNDS: usize = 60;
 const LONGEST: f64 = 0.1;
@@ -49,7 +53,11 @@ pub(super) fn feature_atoms<const D: usize>(
 ) -> Result<Vec<FeatureAtom<D>>, Cancelled> {
     check(watch, Phase::Grow, 0.0, None)?;
     let curves = Curves::of(pieces, bounds, distance);
-    let mut atoms = apart(curves.atoms(distance), bounds, distance);
+    let mut atoms = curves.atoms(distance);
+    for atom in &mut atoms {
+        atom.position = onto_sides(&atom.position, bounds, ON_SIDE * pieces.step());
+    }
+    let mut atoms = apart(atoms, bounds, distance);
     if D > 2 {
         let held = atoms.len();
         add_on_surfaces(&mut atoms, pieces, bounds, distance);
@@ -104,7 +112,7 @@ fn add_on_surfaces<const D: usize>(
     for i in order {
         let (point, piece) = all[i];
         let d = distance.at(&point.position);
-        let mut is_free = true;
+        let mut is_free = inner(bounds, d).contains(&point.position);
         bins.near(&point.position, FIRST * d, |j| {
             let other: &FeatureAtom<D> = &atoms[j];
             let least = if other.pieces.contains(&piece) { FIRST } else { APART };
@@ -141,10 +149,9 @@ fn settle<const D: usize>(
             let length = RATE * dot(&force, &force).sqrt();
             let scale = RATE * d * (LONGEST / length.max(LONGEST));
             let to: Point<D> = std::array::from_fn(|k| atom.position[k] + scale * force[k]);
-            let to = bounds.clamp(&to);
-            let foot = pieces.foot_on(atom.pieces[0], &to, 2.0 * d)?;
-            let place = bounds.clamp(&foot.position);
-            (foot.beyond == 0.0).then_some(place)
+            let inner = inner(bounds, d);
+            let foot = pieces.foot_on(atom.pieces[0], &inner.clamp(&to), 2.0 * d)?;
+            (foot.beyond == 0.0 && inner.contains(&foot.position)).then_some(foot.position)
         };
         let places: Vec<Option<Point<D>>> = (atoms[held..].par_iter().enumerate())
             .with_min_len(1 << 6)
@@ -155,6 +162,23 @@ fn settle<const D: usize>(
         }
     }
     Ok(())
+}
+
+/// The place itself, put on the sides of the box that are nearer than `near`.
+fn onto_sides<const D: usize>(place: &Point<D>, bounds: &Bounds<D>, near: f64) -> Point<D> {
+    std::array::from_fn(|k| {
+        let sides = [bounds.min[k], bounds.max[k]];
+        sides.into_iter().find(|side| (place[k] - side).abs() <= near).unwrap_or(place[k])
+    })
+}
+
+/// The part of the box in which atoms of surfaces are: nearer to its sides are the curves in which surfaces meet them.
+fn inner<const D: usize>(bounds: &Bounds<D>, d: f64) -> Bounds<D> {
+    let inset = |k: usize| (SIDE * d).min(0.5 * (bounds.max[k] - bounds.min[k]));
+    Bounds {
+        min: std::array::from_fn(|k| bounds.min[k] + inset(k)),
+        max: std::array::from_fn(|k| bounds.max[k] - inset(k)),
+    }
 }
 
 /// Adds the pair force that an atom at `other` has on one at `at`, over its greatest (Shimada 1993).

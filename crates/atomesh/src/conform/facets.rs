@@ -8,11 +8,12 @@ use rayon::prelude::*;
 
 use crate::crests::Pieces;
 use crate::fields::NominalDistance;
-use crate::geometry::Point;
+use crate::geometry::{Bounds, Point};
 use crate::mesh::Mesh;
 
-/// A point within this of a piece is on it, in mean steps.
-const ON: f64 = 0.05;
+/// A point within this of a piece is on it, in mean steps: within the box, and on its sides, where pieces are led on.
+const ON: f64 = 0.1;
+const ON_AT_SIDE: f64 = 0.35;
 /// A point this far beyond the end of a piece still is on it, in mean steps.
 const BEYOND: f64 = 0.5;
 
@@ -28,13 +29,19 @@ pub struct FeatureFacet<const D: usize> {
 }
 
 /// The pieces that each place lies on.
-pub(super) fn pieces_at<const D: usize>(places: &[Point<D>], pieces: &Pieces<D>) -> Vec<Vec<u32>> {
+pub(super) fn pieces_at<const D: usize>(
+    places: &[Point<D>],
+    pieces: &Pieces<D>,
+    bounds: &Bounds<D>,
+) -> Vec<Vec<u32>> {
     let step = pieces.step();
     let of = |p: &Point<D>| -> Vec<u32> {
-        let mut found = pieces.near(p, 3.0 * step);
+        let is_inner = bounds.freedom(p).count_ones() as usize == D;
+        let (on, reach) = if is_inner { (ON, 3.0) } else { (ON_AT_SIDE, 8.0) };
+        let mut found = pieces.near(p, reach * step);
         found.retain(|&piece| {
-            pieces.foot_on(piece, p, 3.0 * step).is_some_and(|foot| {
-                foot.signed_distance(p).abs() <= ON * step && foot.beyond <= BEYOND * step
+            pieces.foot_on(piece, p, reach * step).is_some_and(|foot| {
+                foot.signed_distance(p).abs() <= on * step && foot.beyond <= BEYOND * step
             })
         });
         found
@@ -51,7 +58,8 @@ pub fn feature_facets<const D: usize>(
     if pieces.is_empty() {
         return Vec::new();
     }
-    let of_points = pieces_at(mesh.points(), pieces);
+    let bounds = Bounds::of(mesh.points()).unwrap_or(Bounds { min: [0.0; D], max: [0.0; D] });
+    let of_points = pieces_at(mesh.points(), pieces, &bounds);
     let corners = |cell: u32| {
         let first = cell as usize * (D + 1);
         &mesh.corners()[first..first + D + 1]

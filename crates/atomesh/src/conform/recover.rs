@@ -19,7 +19,9 @@ const BROUGHT: f64 = 1.0 / 3.0;
 /// A new atom at a crossing is as far as this from all others, over d.
 const ALONE: f64 = 0.3;
 /// An end of an edge within this of a piece is on it, in mean steps.
-const ON: f64 = 0.1;
+const ON: f64 = 0.35;
+/// Ends of crossing edges farther from a piece than this, over d, are not taken away.
+const FAR: f64 = 0.75;
 
 /// An edge that crosses a piece.
 #[derive(Clone, Copy, Debug)]
@@ -96,7 +98,7 @@ pub(super) fn recovered<const D: usize>(
     distance: &NominalDistance<D>,
 ) -> (Lattice<D>, bool) {
     let bounds = *lattice.bounds();
-    let of_atoms = pieces_at(lattice.atoms(), pieces);
+    let of_atoms = pieces_at(lattice.atoms(), pieces, &bounds);
     let all = Bins::of(&bounds, distance.least(), lattice.atoms().iter().copied());
     let mut on = OnPieces::new(&lattice, &of_atoms, distance);
     let mut is_touched = vec![false; lattice.len()];
@@ -134,7 +136,7 @@ pub(super) fn recovered<const D: usize>(
     if is_touched.contains(&true) {
         lattice = lattice.moved_to(atoms);
         for (i, &is_touched) in is_touched.iter().enumerate() {
-            if is_touched && pieces_at(&lattice.atoms()[i..=i], pieces)[0].is_empty() {
+            if is_touched && pieces_at(&lattice.atoms()[i..=i], pieces, &bounds)[0].is_empty() {
                 continue; // an end of an edge with a new atom
             }
             if is_touched {
@@ -145,8 +147,11 @@ pub(super) fn recovered<const D: usize>(
         return (lattice, true);
     }
     let mut goes = vec![false; lattice.len()];
-    for Crossing { ends, heights, .. } in crossings {
+    for Crossing { ends, heights, place, .. } in crossings {
         let nearer = usize::from(heights[1].abs() < heights[0].abs());
+        if heights[nearer].abs() > FAR * distance.at(place) {
+            continue;
+        }
         let may_go = |end: u32| {
             lattice.temperature(end as usize) > 0.0 && lattice.freedom_in_box(end as usize) != 0
         };

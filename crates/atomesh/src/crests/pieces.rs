@@ -33,7 +33,7 @@ const GAP: f64 = 5.0;
 /// An end has its neighbours on one side: their mean is farther than this, in mean steps.
 const LOPSIDED: f64 = 1.2;
 /// How far pieces on one line or plane may be apart and still be joined, in mean steps.
-const BRIDGE: f64 = 16.0;
+const BRIDGE: f64 = 26.0;
 /// How far from where features meet the ends of pieces are, in mean steps.
 const NEAR_MEETING: f64 = 6.0;
 /// How far the points between joined pieces are apart, in mean steps.
@@ -46,7 +46,7 @@ const FOOT_ROUNDS: usize = 3;
 /// How far from the nearest point of a piece a place may be along the piece and still be on it, in mean steps: in the
 /// image, and within this of the image's sides, where filters see too little.
 const END: f64 = 1.2;
-const END_AT_SIDE: f64 = 4.0;
+const END_AT_SIDE: f64 = 6.0;
 
 /// Pieces of features, in lattice coordinates.
 #[derive(Clone, Debug)]
