@@ -2,7 +2,7 @@
 
 use rayon::prelude::*;
 
-use crate::crests::{Bins, Pieces};
+use crate::crests::{Bins, Foot, Pieces, PointGrid};
 use crate::fields::NominalDistance;
 use crate::geometry::{Bounds, Point, difference, distance_squared, dot};
 use crate::watch::{Cancelled, Phase, Watch, check};
@@ -20,8 +20,10 @@ const SETTLED: f64 = 0.55;
 const SIDE: f64 = 0.4;
 /// An atom nearer to a side of the box than this is on it, in mean steps.
 const ON_SIDE: f64 = 0.05;
-/// How often atoms on surfaces are moved by the pair force, and how far at most each time, over d.
-const ROUNDS: usize = 60;
+/// How often atoms on surfaces are brought onto their pieces, how often they are moved by the pair force each time, and
+/// how far at most, over d.
+const SWEEPS: usize = 8;
+const ROUNDS: usize = 6;
 const LONGEST: f64 = 0.1;
 const RATE: f64 = 0.08;
 
@@ -126,40 +128,69 @@ fn add_on_surfaces<const D: usize>(
     }
 }
 
-/// Moves the atoms from `held` on by the pair force, each along its piece.
+/// Moves the atoms from `held` on by the pair force, each along its piece: in its tangent plane for some rounds, then
+/// back onto it.
 fn settle<const D: usize>(
-    atoms: &mut Vec<FeatureAtom<D>>,
+    atoms: &mut [FeatureAtom<D>],
     held: usize,
     pieces: &Pieces<D>,
     bounds: &Bounds<D>,
     distance: &NominalDistance<D>,
     watch: &mut dyn Watch,
 ) -> Result<(), Cancelled> {
-    for round in 0..ROUNDS {
-        check(watch, Phase::Grow, 0.2 * round as f64 / ROUNDS as f64, None)?;
-        let bins = Bins::of(bounds, distance.least(), atoms.iter().map(|atom| atom.position));
-        let moved = |(i, atom): (usize, &FeatureAtom<D>)| {
-            let d = distance.at(&atom.position);
-            let mut force = [0.0; D];
-            bins.near(&atom.position, 1.5 * d, |j| {
-                if i != j {
-                    add_force(&mut force, &atom.position, &atoms[j].position, d);
-                }
-            });
-            let length = RATE * dot(&force, &force).sqrt();
-            let scale = RATE * d * (LONGEST / length.max(LONGEST));
-            let to: Point<D> = std::array::from_fn(|k| atom.position[k] + scale * force[k]);
-            let inner = inner(bounds, d);
-            let foot = pieces.foot_on(atom.pieces[0], &inner.clamp(&to), 2.0 * d)?;
-            (foot.beyond == 0.0 && inner.contains(&foot.position)).then_some(foot.position)
-        };
-        let places: Vec<Option<Point<D>>> = (atoms[held..].par_iter().enumerate())
+    for sweep in 0..SWEEPS {
+        check(watch, Phase::Grow, 0.2 * sweep as f64 / SWEEPS as f64, None)?;
+        let feet: Vec<Option<Foot<D>>> = (atoms[held..].par_iter())
             .with_min_len(1 << 6)
-            .map(|(i, atom)| moved((held + i, atom)))
+            .map(|atom| {
+                let d = distance.at(&atom.position);
+                let foot = pieces.foot_on(atom.pieces[0], &atom.position, 2.0 * d)?;
+                let is_in = foot.beyond == 0.0 && inner(bounds, d).contains(&foot.position);
+                is_in.then_some(foot)
+            })
             .collect();
-        for (atom, place) in atoms[held..].iter_mut().zip(places) {
-            atom.position = place.unwrap_or(atom.position);
+        for (atom, foot) in atoms[held..].iter_mut().zip(&feet) {
+            atom.position = foot.map_or(atom.position, |foot| foot.position);
         }
+        let mut places: Vec<Point<D>> = atoms.iter().map(|atom| atom.position).collect();
+        for _ in 0..ROUNDS {
+            let grid = PointGrid::new(bounds, distance.least(), places.iter().copied());
+            let moved = |(i, foot): (usize, &Option<Foot<D>>)| {
+                let place = places[held + i];
+                let Some(foot) = foot else { return place };
+                let d = distance.at(&place);
+                let mut force = [0.0; D];
+                grid.near(&place, 1.5 * d, |other, j| {
+                    if held + i != j {
+                        add_force(&mut force, &place, other, d);
+                    }
+                });
+                let across = dot(&force, &foot.normal);
+                (0..D).for_each(|k| force[k] -= across * foot.normal[k]);
+                let length = RATE * dot(&force, &force).sqrt();
+                let scale = RATE * d * (LONGEST / length.max(LONGEST));
+                let to = std::array::from_fn(|k| place[k] + scale * force[k]);
+                inner(bounds, d).clamp(&to)
+            };
+            let next: Vec<Point<D>> =
+                (feet.par_iter().enumerate()).with_min_len(1 << 6).map(moved).collect();
+            places[held..].copy_from_slice(&next);
+        }
+        for (atom, place) in atoms[held..].iter_mut().zip(&places[held..]) {
+            atom.position = *place;
+        }
+    }
+    // last, onto the pieces
+    let last: Vec<Option<Point<D>>> = (atoms[held..].par_iter())
+        .with_min_len(1 << 6)
+        .map(|atom| {
+            let d = distance.at(&atom.position);
+            let foot = pieces.foot_on(atom.pieces[0], &atom.position, 2.0 * d)?;
+            (foot.beyond == 0.0).then(|| bounds.clamp(&foot.position))
+        })
+        .collect();
+    for (atom, place) in atoms[held..].iter_mut().zip(last) {
+        atom.position = place.unwrap_or(atom.position);
     }
     Ok(())
 }

@@ -22,7 +22,7 @@ mod trace;
 use rayon::prelude::*;
 
 use crate::crests::{Bins, Pieces};
-use crate::fields::{FieldsView, ImageWeight, NominalDistance};
+use crate::fields::{FieldsView, NominalDistance, ScalarField};
 use crate::geometry::{Point, distance_squared};
 use crate::lattice::{Lattice, LatticeError, Scatterer, fill_holes};
 use crate::mesh::{ConnectError, Delaunay, Mesh};
@@ -37,6 +37,9 @@ use recover::{crossings, recovered};
 const CLEAR: [f64; 2] = [0.7, 0.55];
 /// The same for atoms on the sides of the box.
 const CLEAR_SIDE: [f64; 2] = [0.5, 0.4];
+/// How far from pieces b no longer counts, over d, and in mean steps.
+const CLEARED: f64 = 0.6;
+const CLEARED_STEPS: f64 = 3.0;
 /// How often holes are looked for and filled.
 const FILL_ROUNDS: usize = 2;
 /// How often the atoms are connected to mend crossings.
@@ -99,11 +102,50 @@ pub fn conform<const D: usize>(
     }
     let lattice = fill_holes(scatterer, lattice, distance, FILL_ROUNDS, watch)?;
     let lattice = without_near(lattice.along_curve(), &atoms, distance, 1);
-    let none = ImageWeight::constant(0.0).expect("0 is a weight");
     let options = OptimizeOptions { smoothing_steps: 0, ..options.clone() };
-    let settled = optimize(lattice, FieldsView { weight: &none, ..fields }, &options, watch)?;
+    let rest = without_pieces(fields.potential, pieces, distance);
+    let fields = FieldsView { potential: &rest, ..fields };
+    let settled = optimize(lattice, fields, &options, watch)?;
     let (lattice, report) = settled.into_parts();
     Ok((without_near(lattice, &atoms, distance, 1), report))
+}
+
+/// b without the valleys of pieces, which have their atoms: weaker features go on attracting.
+fn without_pieces<const D: usize>(
+    potential: &ScalarField<D>,
+    pieces: &Pieces<D>,
+    distance: &NominalDistance<D>,
+) -> ScalarField<D> {
+    let grid = *potential.grid();
+    let mut samples = potential.samples().to_vec();
+    for (point, _) in pieces.points() {
+        let reach = (CLEARED * distance.at(&point.position)).max(CLEARED_STEPS * pieces.step());
+        let range = |k: usize| {
+            let low = ((point.position[k] - reach) / grid.step[k]).ceil().max(0.0) as usize;
+            let high = ((point.position[k] + reach) / grid.step[k]).floor().max(0.0) as usize;
+            low..high.min(grid.shape[k] - 1) + 1
+        };
+        let ranges: [std::ops::Range<usize>; D] = std::array::from_fn(range);
+        for row in 0..ranges[1..].iter().map(ExactSizeIterator::len).product() {
+            let (mut rest, mut index, mut stride) = (row, 0, grid.shape[0]);
+            let mut beside = 0.0;
+            for k in 1..D {
+                let place = ranges[k].start + rest % ranges[k].len();
+                rest /= ranges[k].len();
+                beside += (place as f64 * grid.step[k] - point.position[k]).powi(2);
+                index += place * stride;
+                stride *= grid.shape[k];
+            }
+            for i in ranges[0].clone() {
+                let along = i as f64 * grid.step[0] - point.position[0];
+                if along * along + beside <= reach * reach {
+                    samples[index + i] = 0.0;
+                }
+            }
+        }
+    }
+    ScalarField::potential(grid, samples, potential.interpolation())
+        .expect("values within -1 to 1, one for each sample")
 }
 
 /// The lattice without those atoms that may move and are too near to atoms on features.
@@ -147,7 +189,7 @@ pub fn connect<const D: usize>(
     for _ in 0..RECOVER_ROUNDS {
         let mesh = delaunay.connect(lattice.atoms(), watch)?;
         check(watch, Phase::Connect, 0.5, None)?;
-        let crossings = crossings(&mesh, pieces);
+        let crossings = crossings(&mesh, pieces, distance);
         if crossings.is_empty() {
             return Ok((lattice, mesh));
         }

@@ -20,6 +20,8 @@ const BROUGHT: f64 = 1.0 / 3.0;
 const ALONE: f64 = 0.3;
 /// An end of an edge within this of a piece is on it, in mean steps.
 const ON: f64 = 0.35;
+/// Points nearer to a piece than this, over d, may be ends of edges that cross it.
+const NEAR: f64 = 1.5;
 /// Ends of crossing edges farther from a piece than this, over d, are not taken away.
 const FAR: f64 = 0.75;
 
@@ -34,58 +36,83 @@ pub(super) struct Crossing<const D: usize> {
 }
 
 /// The edges that cross a piece between their ends, ascending by ends.
-pub(super) fn crossings<const D: usize>(mesh: &Mesh<D>, pieces: &Pieces<D>) -> Vec<Crossing<D>> {
+pub(super) fn crossings<const D: usize>(
+    mesh: &Mesh<D>,
+    pieces: &Pieces<D>,
+    distance: &NominalDistance<D>,
+) -> Vec<Crossing<D>> {
     let points = mesh.points();
     let step = pieces.step();
-    let mut edges: Vec<[u32; 2]> = Vec::with_capacity(mesh.corners().len());
+    // how far each point is from each piece near it
+    let heights: Vec<Vec<(u32, f64)>> = (points.par_iter())
+        .with_min_len(1 << 8)
+        .map(|p| {
+            let reach = NEAR * distance.at(p) + 3.0 * step;
+            let height = |piece: u32| {
+                let foot = pieces.foot_on(piece, p, reach)?;
+                Some((piece, foot.signed_distance(p)))
+            };
+            pieces.near(p, reach).into_iter().filter_map(height).collect()
+        })
+        .collect();
+    let mut edges: Vec<[u32; 2]> = Vec::new();
     for cell in mesh.cells() {
         for (i, &a) in cell.iter().enumerate() {
-            edges.extend(cell[..i].iter().map(|&b| [a.min(b), a.max(b)]));
+            for &b in &cell[..i] {
+                if is_between(&heights[a as usize], &heights[b as usize], ON * step).is_some() {
+                    edges.push([a.min(b), a.max(b)]);
+                }
+            }
         }
     }
     edges.par_sort_unstable();
     edges.dedup();
     let crossing = |ends: &[u32; 2]| {
-        let [a, b] = ends.map(|end| points[end as usize]);
-        let length = distance_squared(&a, &b).sqrt();
-        let middle = std::array::from_fn(|k| 0.5 * (a[k] + b[k]));
-        let reach = 0.5 * length + 2.0 * step;
-        pieces.near(&middle, reach).into_iter().find_map(|piece| {
-            let far = length + 3.0 * step;
-            let height =
-                |p: &Point<D>| pieces.foot_on(piece, p, far).map(|foot| foot.signed_distance(p));
-            let heights = [height(&a)?, height(&b)?];
-            if heights[0] * heights[1] >= 0.0 || heights.iter().any(|h| h.abs() <= ON * step) {
-                return None;
-            }
-            let mut share = heights[0] / (heights[0] - heights[1]);
-            let (mut low, mut high) = ((0.0, heights[0]), (1.0, heights[1]));
-            let mut place = a;
-            for _ in 0..4 {
-                place = std::array::from_fn(|k| a[k] + share * (b[k] - a[k]));
-                let foot = pieces.foot_on(piece, &place, far)?;
-                let here = foot.signed_distance(&place);
-                if here.abs() < 0.02 * step {
-                    if foot.beyond > 0.0 {
-                        return None;
-                    }
-                    place = foot.position;
-                    break;
-                }
-                if here * low.1 > 0.0 {
-                    low = (share, here)
-                } else {
-                    high = (share, here)
-                }
-                share = low.0 + (high.0 - low.0) * low.1 / (low.1 - high.1);
-            }
-            let foot = pieces.foot_on(piece, &place, 3.0 * step)?;
+        let [a, b] = ends.map(|end| &heights[end as usize]);
+        let (piece, heights) = is_between(a, b, ON * step)?;
+        let ends_at = ends.map(|end| &points[end as usize]);
+        let place = crossing_place(ends_at, heights, piece, pieces)?;
+        Some(Crossing { ends: *ends, heights, piece, place })
+    };
+    edges.par_iter().with_min_len(1 << 6).filter_map(crossing).collect()
+}
+
+/// The first piece that lies between two points, and how far they are from it.
+fn is_between(a: &[(u32, f64)], b: &[(u32, f64)], on: f64) -> Option<(u32, [f64; 2])> {
+    a.iter().find_map(|&(piece, first)| {
+        let &(_, second) = b.iter().find(|(other, _)| *other == piece)?;
+        let is_between = first * second < 0.0 && first.abs() > on && second.abs() > on;
+        is_between.then_some((piece, [first, second]))
+    })
+}
+
+/// Where the line between two points on the two sides of a piece meets it, by false position; `None` beyond its end.
+fn crossing_place<const D: usize>(
+    [a, b]: [&Point<D>; 2],
+    heights: [f64; 2],
+    piece: u32,
+    pieces: &Pieces<D>,
+) -> Option<Point<D>> {
+    let step = pieces.step();
+    let far = distance_squared(a, b).sqrt() + 3.0 * step;
+    let (mut low, mut high) = ((0.0, heights[0]), (1.0, heights[1]));
+    for _ in 0..4 {
+        let share = low.0 + (high.0 - low.0) * low.1 / (low.1 - high.1);
+        let place = std::array::from_fn(|k| a[k] + share * (b[k] - a[k]));
+        let foot = pieces.foot_on(piece, &place, far)?;
+        let here = foot.signed_distance(&place);
+        if here.abs() < 0.05 * step {
             let is_there = foot.beyond == 0.0
                 && distance_squared(&foot.position, &place) < (0.5 * step).powi(2);
-            is_there.then_some(Crossing { ends: *ends, heights, piece, place: foot.position })
-        })
-    };
-    edges.par_iter().with_min_len(1 << 8).filter_map(crossing).collect()
+            return is_there.then_some(foot.position);
+        }
+        if here * low.1 > 0.0 {
+            low = (share, here);
+        } else {
+            high = (share, here);
+        }
+    }
+    None
 }
 
 /// Brings free ends of crossing edges that are near onto the piece, or puts atoms at the crossings, where they are far

@@ -11,7 +11,7 @@ use std::collections::VecDeque;
 
 use rayon::prelude::*;
 
-use super::{Bins, FeaturePoint};
+use super::{Bins, FeaturePoint, PointGrid};
 use crate::geometry::linear::solve;
 use crate::geometry::{Bounds, Point, Sets, difference, distance_squared, dot};
 use crate::image::Grid;
@@ -26,6 +26,8 @@ const LEAST_SUPPORT: f64 = 0.7;
 const ALIKE: f64 = 0.93;
 /// Points with other normals within this, in mean steps, are of a feature that meets the point's own.
 const NEXT: f64 = 2.0;
+/// The greatest share of them.
+const MOST_OTHERS: f64 = 0.25;
 /// The fewest points on a point's plane, itself among them, in the plane; twice as many in space.
 const LEAST_ON: usize = 4;
 /// How far the ends of pieces on one line or plane may be apart where no features meet, in mean steps.
@@ -41,6 +43,8 @@ const FILL: f64 = 0.8;
 /// The deviation of the weights of a fit, and the radius of its points, in mean steps.
 const FIT_WIDTH: f64 = 1.3;
 const FIT_REACH: f64 = 3.25;
+/// A normal that turns less than this, as one minus a cosine, is the same.
+const SAME: f64 = 1e-5;
 /// How often a foot is improved.
 const FOOT_ROUNDS: usize = 3;
 /// How far from the nearest point of a piece a place may be along the piece and still be on it, in mean steps: in the
@@ -56,7 +60,7 @@ pub struct Pieces<const D: usize> {
     of_points: Vec<u32>,
     /// The mean strength of each piece.
     strengths: Vec<f64>,
-    bins: Bins<D>,
+    grid: PointGrid<D>,
     bounds: Bounds<D>,
     /// The mean step of the image.
     step: f64,
@@ -91,11 +95,11 @@ impl<const D: usize> Pieces<D> {
         let (mut points, meetings) = supported(points, &bounds, step);
         points.sort_by_key(|point| point.index);
         let diagonal = LINK * dot(&grid.step, &grid.step).sqrt();
-        let bins = Bins::of(&bounds, step, points.iter().map(|point| point.position));
+        let bins = PointGrid::new(&bounds, 1.5 * step, points.iter().map(|point| point.position));
         let mut sets = Sets::new(points.len());
         let near = |i: usize, reach: f64, is_one: &dyn Fn(usize) -> bool| -> Vec<u32> {
             let mut found = Vec::new();
-            bins.near(&points[i].position, reach, |j| {
+            bins.near(&points[i].position, reach, |_, j| {
                 if j > i && is_one(j) {
                     found.push(j as u32);
                 }
@@ -148,8 +152,12 @@ impl<const D: usize> Pieces<D> {
             .map(|(point, &root)| (point, number[root as usize]))
             .filter(|(_, piece)| *piece != u32::MAX)
             .unzip();
-        let bins = Bins::of(bounds, step, points.iter().map(|point| point.position));
-        Self { points, of_points, strengths, bins, bounds: *bounds, step }
+        let grid = PointGrid::new(bounds, 1.5 * step, points.iter().map(|point| point.position));
+        let order = grid.order();
+        let points: Vec<FeaturePoint<D>> = order.iter().map(|&i| points[i]).collect();
+        let of_points = order.iter().map(|&i| of_points[i]).collect();
+        let grid = PointGrid::new(bounds, 1.5 * step, points.iter().map(|point| point.position));
+        Self { points, of_points, strengths, grid, bounds: *bounds, step }
     }
 
     /// How many pieces there are.
@@ -172,7 +180,7 @@ impl<const D: usize> Pieces<D> {
         self.step
     }
 
-    /// All points, in the order of their samples, with the piece of each.
+    /// All points, near ones together, with the piece of each.
     pub fn points(&self) -> impl ExactSizeIterator<Item = (&FeaturePoint<D>, u32)> {
         self.points.iter().zip(self.of_points.iter().copied())
     }
@@ -192,7 +200,7 @@ impl<const D: usize> Pieces<D> {
     /// The pieces that have a point within `reach` of `p`, in order.
     pub fn near(&self, p: &Point<D>, reach: f64) -> Vec<u32> {
         let mut found: Vec<u32> = Vec::new();
-        self.bins.near(p, reach, |i| {
+        self.grid.near(p, reach, |_, i| {
             let is_near = distance_squared(&self.points[i].position, p) <= reach * reach;
             if is_near && !found.contains(&self.of_points[i]) {
                 found.push(self.of_points[i]);
@@ -207,7 +215,7 @@ impl<const D: usize> Pieces<D> {
         let mut within = (3.0 * self.step).min(reach);
         loop {
             let mut best = (within * within, None);
-            self.bins.near(p, within, |i| {
+            self.grid.near(p, within, |_, i| {
                 let found = (distance_squared(&self.points[i].position, p), Some(i));
                 if wanted(self.of_points[i]) && found <= best {
                     best = found;
@@ -237,7 +245,13 @@ impl<const D: usize> Pieces<D> {
                 position = x;
                 break;
             }
+            let before = normal;
             (position, normal) = self.fit(piece, &x, &normal, gap)?;
+            if dot(&before, &normal) > 1.0 - SAME
+                && distance_squared(&position, &x) < SAME * self.step
+            {
+                break; // on the piece already, and turned as it is
+            }
         }
         Some(Foot { position, normal, piece, beyond })
     }
@@ -276,7 +290,7 @@ impl<const D: usize> Pieces<D> {
         let mut matrix = [[0.0; 6]; 6];
         let mut right = [[0.0; 1]; 6];
         let mut count = 0;
-        self.bins.near(x, reach, |i| {
+        self.grid.near(x, reach, |_, i| {
             let point = &self.points[i];
             if self.of_points[i] != piece || dot(&point.normal, normal) < 0.3 {
                 return;
@@ -356,26 +370,30 @@ fn supported<const D: usize>(
     bounds: &Bounds<D>,
     step: f64,
 ) -> (Vec<FeaturePoint<D>>, Vec<Point<D>>) {
-    let bins = Bins::of(bounds, step, points.iter().map(|point| point.position));
+    let bins = PointGrid::new(bounds, 1.5 * step, points.iter().map(|point| point.position));
     let reach = SUPPORT * step;
     let is_supported = |point: &FeaturePoint<D>| {
-        let (mut on, mut all, mut others) = (0usize, 0usize, 0usize);
-        bins.near(&point.position, reach, |j| {
+        let (mut on, mut all, mut others, mut next) = (0usize, 0usize, 0usize, 0usize);
+        bins.near(&point.position, reach, |_, j| {
             let offset = difference(&points[j].position, &point.position);
             let squared = dot(&offset, &offset);
             if squared > reach * reach {
                 return;
             }
+            let is_next = squared <= (NEXT * step).powi(2);
+            next += usize::from(is_next);
             if dot(&points[j].normal, &point.normal).abs() < ALIKE {
                 // of another feature, or around a bend
-                others += usize::from(squared <= (NEXT * step).powi(2));
+                others += usize::from(is_next);
                 return;
             }
             all += 1;
             let height = dot(&offset, &point.normal).abs();
             on += usize::from(height <= 0.12 * squared.sqrt() + 0.3 * step);
         });
-        on >= LEAST_ON * (D - 1) && others == 0 && on as f64 >= LEAST_SUPPORT * all as f64
+        on >= LEAST_ON * (D - 1)
+            && others as f64 <= MOST_OTHERS * next as f64
+            && on as f64 >= LEAST_SUPPORT * all as f64
     };
     let is_kept: Vec<bool> = points.par_iter().with_min_len(1 << 8).map(is_supported).collect();
     let (mut kept, mut others) = (Vec::new(), Vec::new());
@@ -414,19 +432,19 @@ fn bridges<const D: usize>(
     bounds: &Bounds<D>,
     step: f64,
 ) -> Vec<[u32; 2]> {
-    let meeting_bins = Bins::of(bounds, step, meetings.iter().copied());
+    let meeting_bins = PointGrid::new(bounds, 1.5 * step, meetings.iter().copied());
     let is_end = |point: &FeaturePoint<D>| {
         let (reach, mut found) = (NEAR_MEETING * step, false);
-        meeting_bins.near(&point.position, reach, |i| {
+        meeting_bins.near(&point.position, reach, |_, i| {
             found |= distance_squared(&meetings[i], &point.position) <= reach * reach;
         });
         found
     };
     let is_at_meeting: Vec<bool> = points.par_iter().with_min_len(1 << 8).map(is_end).collect();
-    let bins = Bins::of(bounds, step, points.iter().map(|point| point.position));
+    let bins = PointGrid::new(bounds, 1.5 * step, points.iter().map(|point| point.position));
     let is_lopsided = |i: usize| {
         let (mut sum, mut count) = ([0.0; D], 0.0);
-        bins.near(&points[i].position, SUPPORT * step, |j| {
+        bins.near(&points[i].position, SUPPORT * step, |_, j| {
             let offset = difference(&points[j].position, &points[i].position);
             if roots[i] == roots[j] && dot(&offset, &offset) <= (SUPPORT * step).powi(2) {
                 (0..D).for_each(|k| sum[k] += offset[k]);
@@ -442,12 +460,12 @@ fn bridges<const D: usize>(
         .collect();
     let even = |&i: &u32| evened(i as usize, points, roots, &bins, step);
     let evened: Vec<FeaturePoint<D>> = ends.par_iter().with_min_len(1 << 6).map(even).collect();
-    let end_bins = Bins::of(bounds, 2.0 * step, evened.iter().map(|point| point.position));
+    let end_bins = PointGrid::new(bounds, 3.0 * step, evened.iter().map(|point| point.position));
     let across = |at: usize| {
         let (own, point) = (ends[at], &evened[at]);
         let reach = step * if is_at_meeting[own as usize] { BRIDGE } else { GAP };
         let mut best = (reach * reach, None);
-        end_bins.near(&point.position, reach, |j| {
+        end_bins.near(&point.position, reach, |_, j| {
             let other = ends[j];
             let found = (distance_squared(&evened[j].position, &point.position), Some(other));
             if roots[own as usize] != roots[other as usize]
@@ -471,12 +489,12 @@ fn evened<const D: usize>(
     i: usize,
     points: &[FeaturePoint<D>],
     roots: &[u32],
-    bins: &Bins<D>,
+    bins: &PointGrid<D>,
     step: f64,
 ) -> FeaturePoint<D> {
     let (point, reach) = (points[i], SUPPORT * step);
     let mut sum = [0.0; D];
-    bins.near(&point.position, reach, |j| {
+    bins.near(&point.position, reach, |_, j| {
         let cosine = dot(&points[j].normal, &point.normal);
         let is_near = distance_squared(&points[j].position, &point.position) <= reach * reach;
         if is_near && roots[i] == roots[j] && cosine.abs() > 0.85 {

@@ -18,8 +18,9 @@ use super::prepared::{Parts, Prepared};
 
 /// The fewest points of a piece: so many d over the step, or d² over its square in space.
 const LEAST_PIECE: f64 = 3.0;
-/// The Gaussian by which valleys are found, in samples.
-const VALLEY_SCALE: f64 = 0.9;
+/// The least square of the deviation by which b is smoothed to find valleys, in samples; together with a sample that b
+/// has already it is max(1, d/6).
+const LEAST_VARIANCE: f64 = 0.8;
 /// The least depth of a valley at all, and over that of the deepest tenth.
 const LEAST_DEPTH: f32 = 0.05;
 const DEPTH_SHARE: f32 = 0.22;
@@ -134,7 +135,7 @@ fn pieces<const D: usize>(
         }
     }
     if is_valley {
-        points.extend(deep_valleys(potential, watch)?);
+        points.extend(deep_valleys(potential, distance, watch)?);
     }
     let size = distance.least() / grid.step.iter().product::<f64>().powf(1.0 / D as f64);
     let least_count = LEAST_PIECE * size.powi(D as i32 - 1);
@@ -145,17 +146,17 @@ fn pieces<const D: usize>(
 /// The bottoms of the deep valleys of b, in lattice coordinates.
 fn deep_valleys<const D: usize>(
     potential: &ScalarField<D>,
+    distance: &NominalDistance<D>,
     watch: &mut dyn Watch,
 ) -> Result<Vec<FeaturePoint<D>>, RunError> {
     let grid = potential.grid();
     if potential.range().0 > -LEAST_DEPTH {
         return Ok(Vec::new());
     }
-    let search = ValleySearch {
-        sigma: [VALLEY_SCALE; D],
-        least_depth: LEAST_DEPTH,
-        phase: Phase::Potential,
-    };
+    let size = distance.least() / grid.step.iter().product::<f64>().powf(1.0 / D as f64);
+    let scale = ((size / 6.0).powi(2) - 1.0).max(LEAST_VARIANCE).sqrt();
+    let search =
+        ValleySearch { sigma: [scale; D], least_depth: LEAST_DEPTH, phase: Phase::Potential };
     let found = bottoms(potential.samples(), grid.shape, &search, watch)?;
     let found = strongest(found, DEPTH_SHARE);
     Ok(found.iter().map(|point| point.in_lattice(grid)).collect())

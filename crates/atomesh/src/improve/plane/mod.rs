@@ -64,10 +64,7 @@ impl Improver<2> for PlaneImprover {
         if options.align == Align::Off {
             return Ok((mesh, before.report(before)));
         }
-        let guides = match options.align {
-            Align::Conform => Vec::new(), // features have their edges
-            _ => find_guides(fields, watch)?,
-        };
+        let guides = find_guides(fields, watch)?;
         if guides.is_empty() && before.below == 0 {
             return Ok((mesh, before.report(before)));
         }

@@ -28,9 +28,6 @@ impl Triangles {
         let mut neighbours = vec![[NONE; 3]; mesh.cell_count()];
         for facet in mesh.facets() {
             let Some(neighbour) = facet.neighbour else { continue };
-            if held.binary_search(&facet.corners).is_ok() {
-                continue; // as on the hull
-            }
             for (cell, other) in [(facet.cell, neighbour), (neighbour, facet.cell)] {
                 let corners = &mesh.corners()[3 * cell as usize..][..3];
                 let off = corners.iter().position(|c| !facet.corners.contains(c));
@@ -53,7 +50,24 @@ impl Triangles {
                 triangles.guides[cell as usize].push(i as u32);
             }
         }
+        triangles.hold(held);
         triangles
+    }
+
+    /// Parts the cells at these edges, ascending, as if they were on the hull.
+    fn hold(&mut self, held: &[[u32; 2]]) {
+        if held.is_empty() {
+            return;
+        }
+        for (corners, neighbours) in self.corners.iter().zip(&mut self.neighbours) {
+            for k in 0..3 {
+                let mut edge = [corners[(k + 1) % 3], corners[(k + 2) % 3]];
+                edge.sort_unstable();
+                if held.binary_search(&edge).is_ok() {
+                    neighbours[k] = NONE;
+                }
+            }
+        }
     }
 
     /// The cell that holds a point, if a walk from `start` reaches one: each time across the side that the point
