@@ -21,7 +21,7 @@ const ALONE: f64 = 0.3;
 /// An end of an edge within this of a piece is on it, in mean steps.
 const ON: f64 = 0.35;
 /// Points nearer to a piece than this, over d, may be ends of edges that cross it.
-const NEAR: f64 = 1.5;
+const NEAR: f64 = 1.2;
 /// Ends of crossing edges farther from a piece than this, over d, are not taken away.
 const FAR: f64 = 0.75;
 

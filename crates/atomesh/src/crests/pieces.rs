@@ -7,7 +7,7 @@
 //! Between its points a piece is what a moving least squares fit of second degree says (Alexa and others 2001): it
 //! averages the noise of single points, and follows curvature.
 
-use std::collections::VecDeque;
+use std::collections::{HashSet, VecDeque};
 
 use rayon::prelude::*;
 
@@ -27,7 +27,7 @@ const ALIKE: f64 = 0.93;
 /// Points with other normals within this, in mean steps, are of a feature that meets the point's own.
 const NEXT: f64 = 2.0;
 /// The greatest share of them.
-const MOST_OTHERS: f64 = 0.25;
+const MOST_OTHERS: f64 = 0.12;
 /// The fewest points on a point's plane, itself among them, in the plane; twice as many in space.
 const LEAST_ON: usize = 4;
 /// How far the ends of pieces on one line or plane may be apart where no features meet, in mean steps.
@@ -38,6 +38,8 @@ const LOPSIDED: f64 = 1.2;
 const BRIDGE: f64 = 26.0;
 /// How far from where features meet the ends of pieces are, in mean steps.
 const NEAR_MEETING: f64 = 6.0;
+/// The width of cubes in which one end of a piece is tried, in mean steps.
+const SPARSE: f64 = 1.5;
 /// How far the points between joined pieces are apart, in mean steps.
 const FILL: f64 = 0.8;
 /// The deviation of the weights of a fit, and the radius of its points, in mean steps.
@@ -45,6 +47,8 @@ const FIT_WIDTH: f64 = 1.3;
 const FIT_REACH: f64 = 3.25;
 /// A normal that turns less than this, as one minus a cosine, is the same.
 const SAME: f64 = 1e-5;
+/// The width of cubes in which one point stands for all of a piece, in mean steps.
+const COARSE: f64 = 4.0;
 /// How often a foot is improved.
 const FOOT_ROUNDS: usize = 3;
 /// How far from the nearest point of a piece a place may be along the piece and still be on it, in mean steps: in the
@@ -61,6 +65,9 @@ pub struct Pieces<const D: usize> {
     /// The mean strength of each piece.
     strengths: Vec<f64>,
     grid: PointGrid<D>,
+    /// A point of each piece in each cube of some steps, for asking which pieces are near.
+    coarse: PointGrid<D>,
+    of_coarse: Vec<u32>,
     bounds: Bounds<D>,
     /// The mean step of the image.
     step: f64,
@@ -155,9 +162,10 @@ impl<const D: usize> Pieces<D> {
         let grid = PointGrid::new(bounds, 1.5 * step, points.iter().map(|point| point.position));
         let order = grid.order();
         let points: Vec<FeaturePoint<D>> = order.iter().map(|&i| points[i]).collect();
-        let of_points = order.iter().map(|&i| of_points[i]).collect();
+        let of_points: Vec<u32> = order.iter().map(|&i| of_points[i]).collect();
         let grid = PointGrid::new(bounds, 1.5 * step, points.iter().map(|point| point.position));
-        Self { points, of_points, strengths, grid, bounds: *bounds, step }
+        let (coarse, of_coarse) = coarse(&points, &of_points, bounds, step);
+        Self { points, of_points, strengths, grid, coarse, of_coarse, bounds: *bounds, step }
     }
 
     /// How many pieces there are.
@@ -197,13 +205,14 @@ impl<const D: usize> Pieces<D> {
         self.foot_from(nearest, p)
     }
 
-    /// The pieces that have a point within `reach` of `p`, in order.
+    /// All pieces that have a point within `reach` of `p`, and some that are a little farther, in order.
     pub fn near(&self, p: &Point<D>, reach: f64) -> Vec<u32> {
         let mut found: Vec<u32> = Vec::new();
-        self.grid.near(p, reach, |_, i| {
-            let is_near = distance_squared(&self.points[i].position, p) <= reach * reach;
-            if is_near && !found.contains(&self.of_points[i]) {
-                found.push(self.of_points[i]);
+        let reach = reach + COARSE * self.step * (D as f64).sqrt();
+        self.coarse.near(p, reach, |place, i| {
+            let is_near = distance_squared(place, p) <= reach * reach;
+            if is_near && !found.contains(&self.of_coarse[i]) {
+                found.push(self.of_coarse[i]);
             }
         });
         found.sort_unstable();
@@ -224,7 +233,7 @@ impl<const D: usize> Pieces<D> {
             if best.1.is_some() || within >= reach {
                 return best.1;
             }
-            within = (3.0 * within).min(reach);
+            within = (1.7 * within).min(reach);
         }
     }
 
@@ -332,6 +341,23 @@ impl<const D: usize> Pieces<D> {
         let length = dot(&turned, &turned).sqrt();
         Some((place, turned.map(|n| n / length)))
     }
+}
+
+/// The first point of each piece in each cube of some steps, and their pieces.
+fn coarse<const D: usize>(
+    points: &[FeaturePoint<D>],
+    of_points: &[u32],
+    bounds: &Bounds<D>,
+    step: f64,
+) -> (PointGrid<D>, Vec<u32>) {
+    let mut seen = HashSet::new();
+    let is_first = |&i: &usize| {
+        let cube = points[i].position.map(|x| (x / (COARSE * step)) as i64);
+        seen.insert((cube, of_points[i]))
+    };
+    let first: Vec<usize> = (0..points.len()).filter(is_first).collect();
+    let grid = PointGrid::new(bounds, COARSE * step, first.iter().map(|&i| points[i].position));
+    (grid, first.iter().map(|&i| of_points[i]).collect())
 }
 
 /// 1, the coordinates along the axes, and their products, in mean steps.
@@ -453,11 +479,16 @@ fn bridges<const D: usize>(
         });
         dot(&sum, &sum).sqrt() > LOPSIDED * step * count
     };
-    let ends: Vec<u32> = (0..points.len() as u32)
+    let mut ends: Vec<u32> = (0..points.len() as u32)
         .into_par_iter()
         .with_min_len(1 << 8)
         .filter(|&i| is_at_meeting[i as usize] || is_lopsided(i as usize))
         .collect();
+    let mut seen = HashSet::new();
+    ends.retain(|&i| {
+        let cube = points[i as usize].position.map(|x| (x / (SPARSE * step)) as i64);
+        seen.insert((cube, roots[i as usize]))
+    });
     let even = |&i: &u32| evened(i as usize, points, roots, &bins, step);
     let evened: Vec<FeaturePoint<D>> = ends.par_iter().with_min_len(1 << 6).map(even).collect();
     let end_bins = PointGrid::new(bounds, 3.0 * step, evened.iter().map(|point| point.position));

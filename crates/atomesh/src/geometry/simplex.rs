@@ -18,10 +18,13 @@ impl<const D: usize> Simplex<D> {
     /// over D!, positive for positive orientation. Rounded: see [`Simplex::orientation`] for a sign
     /// to trust.
     pub fn measure(&self) -> f64 {
-        let edges: [Point<D>; D] =
-            std::array::from_fn(|k| difference(&self.others[k], &self.first));
         let factorial: f64 = (1..=D).map(|k| k as f64).product();
-        determinant(&edges) / factorial
+        determinant(&self.edges()) / factorial
+    }
+
+    /// The edges from the first corner to the others.
+    pub fn edges(&self) -> [Point<D>; D] {
+        std::array::from_fn(|k| difference(&self.others[k], &self.first))
     }
 
     /// The exact orientation: above 0 if positive, below 0 if negative, 0 if the corners lie on one

@@ -1,7 +1,11 @@
 //! The fourth stage: Delaunay's mesh of the atoms.
 
+use std::collections::HashSet;
+
 use crate::conform::feature_facets;
-use crate::improve::{Align, Held};
+use crate::crests::Pieces;
+use crate::improve::{Align, Held, ImproveReport, Improver};
+use crate::measure::cell_shape;
 use crate::mesh::Mesh;
 use crate::mirror::MirrorReport;
 use crate::optimize::OptimizeReport;
@@ -60,13 +64,68 @@ pub(super) fn improve<const D: usize>(
     };
     let Connected { run, mesh, freedom, report, mirror_report } = connected;
     let options = &run.options().improve;
-    let facets: Vec<[u32; D]> = match run.pieces() {
-        Some(pieces) => (feature_facets(&mesh, pieces, run.distance()).iter())
-            .map(|facet| facet.corners)
-            .collect(),
-        None => Vec::new(),
+    let Some(pieces) = run.pieces() else {
+        let held = Held { freedom: &freedom, facets: &[] };
+        let (mesh, improved) = improver.improve(mesh, held, run.fields(), options, watch)?;
+        return Ok(Improved { run, mesh, report, mirror_report, improve_report: Some(improved) });
     };
-    let held = Held { freedom: &freedom, facets: &facets };
-    let (mesh, improved) = improver.improve(mesh, held, run.fields(), options, watch)?;
+    let (mesh, improved) = improve_around(pieces, mesh, freedom, &run, improver, watch)?;
     Ok(Improved { run, mesh, report, mirror_report, improve_report: Some(improved) })
+}
+
+/// Improves a mesh around its facets on features. Where cells stay below the floor of angles, the floor wins: facets
+/// and points of features at such cells are given free, and the mesh is improved once more.
+fn improve_around<const D: usize>(
+    pieces: &Pieces<D>,
+    mesh: Mesh<D>,
+    freedom: Vec<u8>,
+    run: &Prepared<D>,
+    improver: &dyn Improver<D>,
+    watch: &mut dyn Watch,
+) -> Result<(Mesh<D>, ImproveReport), RunError> {
+    let (options, bounds) = (&run.options().improve, run.bounds());
+    let facets = |mesh: &Mesh<D>| -> Vec<[u32; D]> {
+        let found = feature_facets(mesh, pieces, run.distance());
+        found.iter().map(|facet| facet.corners).collect()
+    };
+    let fixed: HashSet<[u64; D]> = match run.options().seed_points.is_empty() {
+        true => HashSet::new(),
+        false => (freedom.iter().zip(mesh.points()))
+            .filter(|(freedom, _)| **freedom == 0)
+            .map(|(_, p)| p.map(f64::to_bits))
+            .collect(),
+    };
+    let held = facets(&mesh);
+    let held = Held { freedom: &freedom, facets: &held };
+    let (mesh, mut first) = improver.improve(mesh, held, run.fields(), options, watch)?;
+    if first.floor_held {
+        return Ok((mesh, first));
+    }
+    let mut is_released = vec![false; mesh.points().len()];
+    for (cell, simplex) in mesh.cells().zip(mesh.simplices()) {
+        if cell_shape(&simplex.edges()).least_angle < options.min_angle {
+            cell.iter().for_each(|&corner| is_released[corner as usize] = true);
+        }
+    }
+    let held: Vec<[u32; D]> = (facets(&mesh).into_iter())
+        .filter(|facet| !facet.iter().any(|&corner| is_released[corner as usize]))
+        .collect();
+    let mut is_held = vec![false; mesh.points().len()];
+    held.iter().flatten().for_each(|&corner| is_held[corner as usize] = true);
+    let freedom: Vec<u8> = (mesh.points().iter().zip(&is_held))
+        .map(|(p, is_held)| match *is_held || fixed.contains(&p.map(f64::to_bits)) {
+            true => 0,
+            false => bounds.freedom(p),
+        })
+        .collect();
+    let held = Held { freedom: &freedom, facets: &held };
+    let (mesh, second) = improver.improve(mesh, held, run.fields(), options, watch)?;
+    first.rounds += second.rounds;
+    first.swaps += second.swaps;
+    first.moves += second.moves;
+    first.removed += second.removed;
+    first.added += second.added;
+    (first.angle_after, first.below) = (second.angle_after, second.below);
+    first.floor_held = second.floor_held;
+    Ok((mesh, first))
 }

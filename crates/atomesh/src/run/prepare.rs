@@ -16,8 +16,6 @@ use super::method::Method;
 use super::options::{MeshKind, MeshOptions, Size};
 use super::prepared::{Parts, Prepared};
 
-/// The fewest points of a piece: so many d over the step, or d² over its square in space.
-const LEAST_PIECE: f64 = 3.0;
 /// The least square of the deviation by which b is smoothed to find valleys, in samples; together with a sample that b
 /// has already it is max(1, d/6).
 const LEAST_VARIANCE: f64 = 0.8;
@@ -138,7 +136,7 @@ fn pieces<const D: usize>(
         points.extend(deep_valleys(potential, distance, watch)?);
     }
     let size = distance.least() / grid.step.iter().product::<f64>().powf(1.0 / D as f64);
-    let least_count = LEAST_PIECE * size.powi(D as i32 - 1);
+    let least_count = (2 * D) as f64 * size.powi(D as i32 - 1);
     let pieces = Pieces::new(points, grid, least_count.ceil() as usize);
     Ok((!pieces.is_empty()).then_some(pieces))
 }
