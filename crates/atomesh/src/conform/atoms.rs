@@ -65,6 +65,10 @@ pub(super) fn feature_atoms<const D: usize>(
         add_on_surfaces(&mut atoms, pieces, bounds, distance);
         settle(&mut atoms, held, pieces, bounds, distance, watch)?;
         atoms = apart(atoms, bounds, distance);
+        let is_clear: Vec<bool> =
+            atoms.par_iter().map(|atom| is_clear(atom, pieces, distance)).collect();
+        let mut is_clear = is_clear.iter();
+        atoms.retain(|_| is_clear.next() == Some(&true));
     }
     check(watch, Phase::Grow, 0.2, None)?;
     Ok(atoms)
@@ -200,6 +204,26 @@ fn onto_sides<const D: usize>(place: &Point<D>, bounds: &Bounds<D>, near: f64) -
     std::array::from_fn(|k| {
         let sides = [bounds.min[k], bounds.max[k]];
         sides.into_iter().find(|side| (place[k] - side).abs() <= near).unwrap_or(place[k])
+    })
+}
+
+/// Whether an atom on a surface leaves the surfaces that cross it to the atoms where they cross.
+fn is_clear<const D: usize>(
+    atom: &FeatureAtom<D>,
+    pieces: &Pieces<D>,
+    distance: &NominalDistance<D>,
+) -> bool {
+    if atom.rank < 2 {
+        return true;
+    }
+    let clear = APART * distance.at(&atom.position);
+    let mut others = pieces.near(&atom.position, clear);
+    others.retain(|other| !atom.pieces.contains(other));
+    others.iter().all(|&other| {
+        let foot = pieces.foot_on(other, &atom.position, clear);
+        foot.is_none_or(|foot| {
+            foot.beyond > 0.0 || foot.signed_distance(&atom.position).abs() >= clear
+        })
     })
 }
 

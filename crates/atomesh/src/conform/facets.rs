@@ -14,6 +14,8 @@ use crate::mesh::Mesh;
 /// A point within this of a piece is on it, in mean steps: within the box, and on its sides, where pieces are led on.
 const ON: f64 = 0.1;
 const ON_AT_SIDE: f64 = 0.35;
+/// The same for other pieces than the nearest: where they cross, a place on both is known less well.
+const ON_AT_CROSSING: f64 = 0.5;
 /// A point this far beyond the end of a piece still is on it, in mean steps.
 const BEYOND: f64 = 0.5;
 
@@ -37,14 +39,20 @@ pub(super) fn pieces_at<const D: usize>(
     let step = pieces.step();
     let of = |p: &Point<D>| -> Vec<u32> {
         let is_inner = bounds.freedom(p).count_ones() as usize == D;
-        let (on, reach) = if is_inner { (ON, 3.0) } else { (ON_AT_SIDE, 8.0) };
-        let mut found = pieces.near(p, reach * step);
-        found.retain(|&piece| {
-            pieces.foot_on(piece, p, reach * step).is_some_and(|foot| {
-                foot.signed_distance(p).abs() <= on * step && foot.beyond <= BEYOND * step
-            })
-        });
-        found
+        let is_near_side = (0..D)
+            .any(|k| (p[k] - bounds.min[k]).min(bounds.max[k] - p[k]) < pieces.led_on() * step);
+        let on = if is_inner { ON } else { ON_AT_SIDE };
+        let reach = if is_near_side { pieces.led_on() + 2.0 } else { 3.0 };
+        let height = |piece: u32| {
+            let foot = pieces.foot_on(piece, p, reach * step)?;
+            let is_there = foot.beyond <= BEYOND * step;
+            is_there.then_some((piece, foot.signed_distance(p).abs() / step))
+        };
+        let near: Vec<(u32, f64)> =
+            pieces.near(p, reach * step).into_iter().filter_map(height).collect();
+        let least = near.iter().map(|(_, height)| *height).fold(f64::INFINITY, f64::min);
+        let most = if least <= on { on.max(ON_AT_CROSSING) } else { on };
+        near.into_iter().filter(|(_, height)| *height <= most).map(|(piece, _)| piece).collect()
     };
     places.par_iter().with_min_len(1 << 8).map(of).collect()
 }

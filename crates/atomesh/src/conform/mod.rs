@@ -31,7 +31,7 @@ use crate::watch::{Cancelled, Phase, Watch, check};
 
 use atoms::{FeatureAtom, feature_atoms};
 pub use facets::{FeatureFacet, feature_facets};
-use recover::{crossings, recovered};
+use recover::{brought_near, crossings, recovered};
 
 /// The least distance of other atoms from those on features, over d: before they settle, and after.
 const CLEAR: [f64; 2] = [0.7, 0.55];
@@ -187,6 +187,7 @@ pub fn connect<const D: usize>(
     watch: &mut dyn Watch,
 ) -> Result<(Lattice<D>, Mesh<D>), ConnectError> {
     for _ in 0..RECOVER_ROUNDS {
+        lattice = brought_near(lattice, pieces);
         let mesh = delaunay.connect(lattice.atoms(), watch)?;
         check(watch, Phase::Connect, 0.5, None)?;
         let crossings = crossings(&mesh, pieces, distance);

@@ -16,6 +16,8 @@ const CLEAR: f64 = 0.45;
 const THINNED: f64 = 0.6;
 /// An end of an edge nearer to a piece than this is brought onto it, over d.
 const BROUGHT: f64 = 1.0 / 3.0;
+/// An atom of a piece keeps as far as this from other pieces, over d: where they cross they share theirs.
+const OTHER: f64 = 0.35;
 /// A new atom at a crossing is as far as this from all others, over d.
 const ALONE: f64 = 0.3;
 /// An end of an edge within this of a piece is on it, in mean steps.
@@ -143,6 +145,7 @@ pub(super) fn recovered<const D: usize>(
             let foot = pieces.foot_on(*piece, &atoms[end], d);
             let to = foot.filter(|foot| foot.beyond == 0.0).map(|foot| foot.position);
             let to = to.filter(|to| bounds.freedom(to).count_ones() as usize == D);
+            let to = to.filter(|to| !is_near_other(to, *piece, pieces, OTHER * d));
             if let Some(to) = to.filter(|to| bounds.contains(to) && on.is_clear(to, *piece, d)) {
                 on.add(&to, *piece);
                 (atoms[end], is_touched[end]) = (to, true);
@@ -150,11 +153,20 @@ pub(super) fn recovered<const D: usize>(
             }
         }
         let place = bounds.clamp(place);
+        // where the edge lies in another piece, the two must share an atom
+        let [a, b] = ends.map(|end| &of_atoms[end as usize]);
+        let shared = a.iter().copied().find(|piece| b.contains(piece));
         let mut is_alone = true;
         all.near(&place, ALONE * d, |i| {
             is_alone &= distance_squared(&lattice.atoms()[i], &place) >= (ALONE * d).powi(2);
         });
-        if is_alone && on.is_clear(&place, *piece, d) {
+        let is_clear = match shared {
+            Some(_) => true,
+            None => {
+                on.is_clear(&place, *piece, d) && !is_near_other(&place, *piece, pieces, OTHER * d)
+            }
+        };
+        if is_alone && is_clear {
             on.add(&place, *piece);
             ends.iter().for_each(|&end| is_touched[end as usize] = true);
             new.push(place);
@@ -192,6 +204,48 @@ pub(super) fn recovered<const D: usize>(
     }
     let is_changed = goes.contains(&true);
     (lattice.retained(|i| !goes[i]), is_changed)
+}
+
+/// Whether another piece than its own is nearer to a place than `clear`.
+fn is_near_other<const D: usize>(
+    place: &Point<D>,
+    own: u32,
+    pieces: &Pieces<D>,
+    clear: f64,
+) -> bool {
+    pieces.near(place, clear).into_iter().filter(|&piece| piece != own).any(|piece| {
+        let foot = pieces.foot_on(piece, place, clear + 2.0 * pieces.step());
+        foot.is_some_and(|foot| foot.beyond == 0.0 && foot.signed_distance(place).abs() < clear)
+    })
+}
+
+/// Puts free atoms that are nearly on a piece onto it, and freezes them: as free ones they would be on neither side.
+pub(super) fn brought_near<const D: usize>(
+    mut lattice: Lattice<D>,
+    pieces: &Pieces<D>,
+) -> Lattice<D> {
+    let (bounds, step) = (*lattice.bounds(), pieces.step());
+    let to = |i: usize| -> Option<Point<D>> {
+        let atom = &lattice.atoms()[i];
+        if lattice.temperature(i) == 0.0 || bounds.freedom(atom).count_ones() as usize != D {
+            return None;
+        }
+        let near = pieces.near(atom, 1.0);
+        let mut feet = near.into_iter().filter_map(|piece| pieces.foot_on(piece, atom, 2.0 * step));
+        let foot =
+            feet.find(|foot| foot.beyond == 0.0 && foot.signed_distance(atom).abs() <= ON * step)?;
+        (bounds.freedom(&foot.position).count_ones() as usize == D).then_some(foot.position)
+    };
+    let places: Vec<Option<Point<D>>> =
+        (0..lattice.len()).into_par_iter().with_min_len(1 << 8).map(to).collect();
+    let mut atoms = lattice.atoms().to_vec();
+    for (i, place) in places.into_iter().enumerate() {
+        if let Some(place) = place {
+            atoms[i] = place;
+            lattice.set_temperature(i, 0.0);
+        }
+    }
+    lattice.moved_to(atoms)
 }
 
 /// The atoms on pieces.

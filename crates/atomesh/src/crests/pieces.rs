@@ -188,6 +188,11 @@ impl<const D: usize> Pieces<D> {
         self.step
     }
 
+    /// How far pieces are led on to the sides of the box, in mean steps.
+    pub(crate) fn led_on(&self) -> f64 {
+        END_AT_SIDE
+    }
+
     /// All points, near ones together, with the piece of each.
     pub fn points(&self) -> impl ExactSizeIterator<Item = (&FeaturePoint<D>, u32)> {
         self.points.iter().zip(self.of_points.iter().copied())
