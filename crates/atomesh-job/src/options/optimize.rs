@@ -83,8 +83,9 @@ impl OptimizerOptions {
 section! {
     /// How the mesh is improved once the atoms are connected.
     pub struct ImprovementOptions {
-        /// Turn the edges (2-D) or faces (3-D) of the mesh onto features: not at all (off), by swaps alone, or
-        /// by swaps and moves of points (full). Default: full
+        /// Turn the edges (2-D) or faces (3-D) of the mesh onto features: not at all (off), by swaps alone, by
+        /// swaps and moves of points (full), or by atoms that stand on features before all others, so that each
+        /// feature is one line or sheet of them, tagged (conform). Default: full
         #[arg(long, value_name = "HOW",
             value_parser = named::<Align>(&["off", "swaps", "full", "conform"]))]
         pub align: Align,

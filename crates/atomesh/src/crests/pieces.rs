@@ -632,3 +632,119 @@ fn turn<const D: usize>(points: &mut [FeaturePoint<D>], links: &[Vec<u32>], brid
         }
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    const STEP: f64 = 1.0;
+
+    fn at<const D: usize>(grid: &Grid<D>, position: Point<D>, normal: Point<D>) -> FeaturePoint<D> {
+        let sample: [usize; D] =
+            std::array::from_fn(|k| (position[k].round().max(0.0) as usize).min(grid.shape[k] - 1));
+        FeaturePoint {
+            index: (0..D).rev().fold(0, |index, k| index * grid.shape[k] + sample[k]),
+            position,
+            normal,
+            strength: 1.0,
+        }
+    }
+
+    /// Points along a line, one a sample.
+    fn line(grid: &Grid<2>, through: Point<2>, normal: Point<2>) -> Vec<FeaturePoint<2>> {
+        let along = [-normal[1], normal[0]];
+        (-200..200)
+            .map(|i| std::array::from_fn(|k| through[k] + f64::from(i) * along[k]))
+            .filter(|p| grid.bounds().contains(p))
+            // as finders leave the sign of a normal open
+            .enumerate()
+            .map(|(i, p)| at(grid, p, normal.map(|n| if i % 3 == 0 { -n } else { n })))
+            .collect()
+    }
+
+    #[test]
+    fn a_foot_on_a_circle_is_on_the_circle() {
+        let grid = Grid { shape: [60, 60], step: [STEP; 2] };
+        let (centre, radius) = ([29.3, 30.1], 12.0);
+        let points = (0..80).map(|i| {
+            let (sine, cosine) = (f64::from(i) * std::f64::consts::TAU / 80.0).sin_cos();
+            let normal = [cosine, sine];
+            let position = std::array::from_fn(|k| centre[k] + radius * normal[k]);
+            at(&grid, position, normal)
+        });
+        let pieces = Pieces::new(points.collect(), &grid, 10);
+        assert_eq!(pieces.len(), 1);
+        for (angle, from) in [(0.3f64, 14.5), (1.9, 10.2), (4.0, 12.0)] {
+            let p = [centre[0] + from * angle.cos(), centre[1] + from * angle.sin()];
+            let foot = pieces.foot(&p, 10.0).unwrap();
+            let off = (foot.position[0] - centre[0]).hypot(foot.position[1] - centre[1]) - radius;
+            // a fit of second degree to a circle: the fourth derivative is left, σ⁴/8R³
+            assert!(off.abs() < 2e-3, "{off}");
+            assert_eq!(foot.beyond, 0.0);
+            let height = foot.signed_distance(&p);
+            assert!((height.abs() - (from - radius).abs()).abs() < 5e-3, "{height} {from}");
+        }
+        // all normals are on one side
+        let sides: Vec<bool> = (pieces.points())
+            .map(|(p, _)| dot(&p.normal, &difference(&p.position, &centre)) > 0.0)
+            .collect();
+        assert!(sides.iter().all(|&side| side == sides[0]));
+    }
+
+    #[test]
+    fn lines_that_cross_are_two_pieces_whatever_the_middle_says() {
+        let grid = Grid { shape: [80, 80], step: [STEP; 2] };
+        let middle = [40.3, 39.6];
+        for degrees in [35.0f64, 60.0, 90.0] {
+            let (sine, cosine) = degrees.to_radians().sin_cos();
+            let normals = [[0.0, 1.0], [sine, cosine]];
+            let mut points: Vec<FeaturePoint<2>> =
+                normals.iter().flat_map(|&normal| line(&grid, middle, normal)).collect();
+            // where they cross a finder sees the bisector
+            let bisector = [0.5 * degrees.to_radians().sin(), 0.5 * (1.0 + cosine)];
+            let length = bisector[0].hypot(bisector[1]);
+            for point in &mut points {
+                if distance_squared(&point.position, &middle) < 6.0 {
+                    point.normal = bisector.map(|n| n / length);
+                }
+            }
+            let pieces = Pieces::new(points, &grid, 10);
+            assert_eq!(pieces.len(), 2, "{degrees}°");
+            // both go through the crossing
+            for piece in 0..2 {
+                let foot = pieces.foot_on(piece, &middle, 10.0).unwrap();
+                assert!(
+                    foot.beyond == 0.0 && foot.signed_distance(&middle).abs() < 0.3,
+                    "{foot:?}"
+                );
+            }
+        }
+    }
+
+    #[test]
+    fn a_piece_ends_where_its_points_end_but_is_led_on_to_sides() {
+        let grid = Grid { shape: [60, 40], step: [STEP; 2] };
+        let all = line(&grid, [30.0, 20.4], [0.0, 1.0]);
+        let some = all.into_iter().filter(|p| (3.0..40.0).contains(&p.position[0])).collect();
+        let pieces = Pieces::new(some, &grid, 10);
+        assert!(pieces.foot(&[45.0, 21.0], 10.0).unwrap().beyond > 3.0);
+        let foot = pieces.foot(&[0.0, 20.0], 10.0).unwrap();
+        assert_eq!(foot.beyond, 0.0);
+        assert!((foot.position[1] - 20.4).abs() < 1e-6);
+        assert_eq!(pieces.near(&[20.0, 22.0], 3.0), [0]);
+        assert!(pieces.near(&[55.0, 4.0], 1.0).is_empty());
+    }
+
+    #[test]
+    fn few_points_and_clutter_make_no_piece() {
+        let grid = Grid { shape: [60, 40], step: [STEP; 2] };
+        let short = line(&grid, [30.0, 20.4], [0.0, 1.0]).into_iter().take(8).collect();
+        assert!(Pieces::new(short, &grid, 10).is_empty());
+        let clutter = (0..200).map(|i| {
+            let angle = f64::from(i) * 2.4;
+            at(&grid, [f64::from(i * 7 % 59), f64::from(i * 11 % 39)], [angle.cos(), angle.sin()])
+        });
+        assert!(Pieces::new(clutter.collect(), &grid, 10).is_empty());
+        assert!(Pieces::<2>::new(Vec::new(), &grid, 1).is_empty());
+    }
+}

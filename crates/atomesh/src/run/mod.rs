@@ -32,6 +32,8 @@
 //! ```
 
 mod compiled;
+#[cfg(test)]
+mod conform_tests;
 mod connected;
 mod divided;
 mod error;

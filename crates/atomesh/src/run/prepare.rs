@@ -58,8 +58,11 @@ pub(super) fn prepare<const D: usize>(
     warnings.extend(coarse(&grid, &distance));
     check(watch, Phase::Distance, 1.0, None)?;
     let potential = ScalarField::potential(grid, samples, options.interpolation)?;
+    let attracts = options.kind == MeshKind::Delaunay && !options.features.repel;
     let pieces = match options.improve.align {
-        Align::Conform if !is_masked => pieces(&inputs, &options, &potential, &distance, watch)?,
+        Align::Conform if attracts && !is_masked => {
+            pieces(&inputs, &options, &potential, &distance, watch)?
+        }
         _ => None,
     };
     let fields = Fields::new(potential, weight, distance)?;

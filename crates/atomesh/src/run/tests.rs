@@ -8,6 +8,7 @@ use crate::enhance::{FeatureOptions, Features};
 use crate::fields::{DistanceError, GradeBy, Interpolation};
 use crate::geometry::{Point, difference};
 use crate::image::{Frame, Image, Samples, Units};
+use crate::improve::Align;
 use crate::lattice::LatticeError;
 use crate::mesh::Mesh;
 use crate::optimize::{EngineKind, OptimizeOptions};
@@ -189,6 +190,9 @@ fn meshes_or_refusals<const D: usize>(
         let image = random_image::<D>(&mut random, greatest);
         let mut options = MeshOptions { kind: mesh_kind, ..random_options(&mut random, &image) };
         options.features.repel |= mesh_kind == MeshKind::Voronoi && seed % 2 == 0;
+        if seed % 3 == 0 {
+            options.improve.align = Align::Conform;
+        }
         let what = format!("{D}-D, seed {seed}: {:?} {options:?}", image.frame());
         let (kind, weight) = (options.lattice, options.image_weight);
         let (chosen, step) = (options.size, image.frame().grid(options.units).least_step());

@@ -226,12 +226,12 @@ mod tests {
             .map(|i| step(radius(coordinates(i, grid.shape).map(|c| c as f64)) - 13.0))
             .collect();
         let crests = found(&values, &grid, CrestOptions { scale: Some(1.0), ..Default::default() });
-        // smoothing by σ = 1 moves a curved edge inwards by σ²/R = 0.08 (Verbeek & van Vliet 1994); its
-        // slope is a bell a little askew
+        // smoothing by σ moves a curved edge inwards by σ²/R (Verbeek & van Vliet 1994), 0.08 here, and the image's own
+        // blur as much again; both are taken back
         let radii: Vec<f64> = crests.iter().map(|c| radius(c.position)).collect();
-        assert!(radii.iter().all(|r| (r - 12.92).abs() < 0.15), "{radii:?}");
+        assert!(radii.iter().all(|r| (r - 13.0).abs() < 0.15), "{radii:?}");
         let mean = radii.iter().sum::<f64>() / radii.len() as f64;
-        assert!((mean - 12.92).abs() < 0.04, "{mean}");
+        assert!((mean - 13.0).abs() < 0.06, "{mean}");
         // there is at least one crest per column from each side along the axis that is steepest
         assert!(crests.len() > 1500, "{}", crests.len());
     }

@@ -104,6 +104,48 @@ proptest! {
     }
 }
 
+proptest! {
+    #![proptest_config(ProptestConfig::with_cases(12))]
+    #[test]
+    fn facets_that_are_held_stay(
+        shifts in prop::collection::vec(-0.6..0.6f64, 3 * 180),
+        align in prop::sample::select(vec![Align::Swaps, Align::Full, Align::Conform]),
+    ) {
+        let mesh = mesh(&crystal(&shifts));
+        // the border of the cells on one side of a plane
+        let is_low = |cell: u32| {
+            let corners = &mesh.corners()[4 * cell as usize..][..4];
+            corners.iter().map(|&c| mesh.points()[c as usize][2]).sum::<f64>() < 2.0 * SIDE
+        };
+        let held: Vec<[u32; 3]> = (mesh.facets().iter())
+            .filter(|facet| facet.neighbour.is_some_and(|n| is_low(n) != is_low(facet.cell)))
+            .map(|facet| facet.corners)
+            .collect();
+        let places = |mesh: &Mesh<3>, facet: &[u32; 3]| -> [Point<3>; 3] {
+            let mut places = facet.map(|c| mesh.points()[c as usize]);
+            places.sort_by(crate::geometry::lexicographic);
+            places
+        };
+        let mut freedom = vec![7; mesh.points().len()];
+        held.iter().flatten().for_each(|&c| freedom[c as usize] = 0);
+        let potential = potential(sheet);
+        let weight = ImageWeight::constant(0.4).unwrap();
+        let distance = NominalDistance::constant(potential.grid(), 3.0).unwrap();
+        let fields = FieldsView { potential: &potential, weight: &weight, distance: &distance };
+        let options = ImproveOptions { align, ..ImproveOptions::for_dimension(3) };
+        let given = Held { freedom: &freedom, facets: &held };
+        let better = SpaceImprover.improve(mesh.clone(), given, fields, &options, &mut Silent);
+        let (better, _) = better.unwrap();
+        prop_assert_eq!(better.validate(), Ok(()));
+        let facets = better.facets();
+        let after: Vec<[Point<3>; 3]> =
+            facets.iter().map(|facet| places(&better, &facet.corners)).collect();
+        for facet in &held {
+            prop_assert!(after.contains(&places(&mesh, facet)), "{:?} has gone", facet);
+        }
+    }
+}
+
 /// All ways to fill a polygon with triangles: the greatest least worth, and the greatest sum.
 fn best_of_all(i: usize, j: usize, worth: &impl Fn(usize, usize, usize) -> f64) -> (f64, f64) {
     if j < i + 2 {
@@ -238,6 +280,12 @@ fn a_floor_out_of_range_is_refused_and_a_watch_ends_the_work() {
     let fields = FieldsView { potential: &potential, weight: &weight, distance: &distance };
     let freedom = vec![7; mesh.points().len()];
     let options = ImproveOptions::for_dimension(3);
-    let ended = SpaceImprover.improve(mesh, &freedom, fields, &options, &mut Never);
+    let ended = SpaceImprover.improve(
+        mesh,
+        Held { freedom: &freedom, facets: &[] },
+        fields,
+        &options,
+        &mut Never,
+    );
     assert!(matches!(ended, Err(ImproveError::Cancelled(_))));
 }

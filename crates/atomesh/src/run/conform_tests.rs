@@ -1,0 +1,212 @@
+//! Features first, from images to facets.
+
+use std::collections::HashMap;
+
+use super::*;
+use crate::conform::{FeatureFacet, feature_facets};
+use crate::enhance::{FeatureOptions, Features};
+use crate::features::FeatureFacetOptions;
+use crate::geometry::Point;
+use crate::image::{Frame, Image, Samples};
+use crate::improve::{Align, ImproveOptions};
+use crate::watch::Silent;
+
+/// What `grey` says at each sample.
+fn image<const D: usize>(shape: [usize; D], grey: impl Fn(Point<D>) -> f64) -> Image<D> {
+    let frame = Frame::new(shape).unwrap();
+    let samples = (0..frame.sample_count()).map(|index| {
+        let sample = crate::image::coordinates(index, shape);
+        grey(sample.map(|i| i as f64)) as f32
+    });
+    Image::new(frame, Samples::F32(samples.collect())).unwrap()
+}
+
+/// A ball, bright on dark, its edge as smooth as a Gaussian of one sample makes it, nearly.
+fn ball<const D: usize>(shape: [usize; D], centre: Point<D>, radius: f64) -> Image<D> {
+    image(shape, |p| {
+        let squares = (0..D).map(|k| (p[k] - centre[k]).powi(2));
+        0.5 - 0.5 * ((squares.sum::<f64>().sqrt() - radius) / 1.2).tanh()
+    })
+}
+
+fn conforming<const D: usize>(size: f64, features: Features) -> MeshOptions<D> {
+    MeshOptions {
+        size: Size::Constant(size),
+        features: FeatureOptions { features, ..Default::default() },
+        improve: ImproveOptions { align: Align::Conform, ..ImproveOptions::for_dimension(D) },
+        ..Default::default()
+    }
+}
+
+fn run<const D: usize>(
+    method: &Method<D>,
+    image: &Image<D>,
+    options: MeshOptions<D>,
+) -> Outcome<D> {
+    let prepared = prepare(method, Inputs::image(image), options, &mut Silent).unwrap();
+    prepared.run(&mut Silent).unwrap()
+}
+
+fn facets_of<const D: usize>(outcome: &Outcome<D>) -> Vec<FeatureFacet<D>> {
+    let pieces = outcome.run().pieces().expect("the image has features");
+    feature_facets(outcome.mesh(), pieces, outcome.distance())
+}
+
+/// How many facets of features there are at each point (2-D) or edge (3-D), by its corners.
+fn sharing<const D: usize>(facets: &[FeatureFacet<D>]) -> HashMap<Vec<u32>, usize> {
+    let mut shared = HashMap::new();
+    for facet in facets {
+        for skip in 0..D {
+            let key = (0..D).filter(|&k| k != skip).map(|k| facet.corners[k]).collect::<Vec<_>>();
+            *shared.entry(key).or_insert(0) += 1;
+        }
+    }
+    shared
+}
+
+#[test]
+fn the_edge_of_a_disc_is_one_closed_line_at_sub_sample_accuracy() {
+    let (centre, radius) = ([31.3, 29.8], 19.6);
+    let image = ball([64, 60], centre, radius);
+    for size in [8.0, 4.0, 2.5] {
+        let outcome = run(&Method::plane(), &image, conforming(size, Features::Edges));
+        assert_eq!(outcome.mesh().validate(), Ok(()));
+        let facets = facets_of(&outcome);
+        assert!(sharing(&facets).values().all(|&count| count == 2), "d = {size}");
+        assert!(facets.iter().all(|facet| facet.piece == 0));
+        let points = outcome.mesh().points();
+        let mut length = 0.0;
+        for facet in &facets {
+            let [a, b] = facet.corners.map(|c| points[c as usize]);
+            length += (a[0] - b[0]).hypot(a[1] - b[1]);
+            for p in [a, b] {
+                // without the shift that blur gives: tanh is nearly a blurred step
+                let off = (p[0] - centre[0]).hypot(p[1] - centre[1]) - radius;
+                assert!(off.abs() < 0.08, "{off} at d = {size}");
+            }
+        }
+        // the polygon of as many corners that the circle holds
+        let count = facets.len() as f64;
+        let inscribed = 2.0 * count * radius * (std::f64::consts::PI / count).sin();
+        assert!((length / inscribed - 1.0).abs() < 0.005, "{length} {inscribed} at d = {size}");
+        assert!(outcome.improve_report().unwrap().floor_held);
+    }
+}
+
+#[test]
+fn facets_turn_one_way_around_a_disc() {
+    let image = ball([50, 50], [24.6, 25.2], 15.0);
+    let outcome = run(&Method::plane(), &image, conforming(5.0, Features::Edges));
+    let facets = facets_of(&outcome);
+    let outward = facets.iter().filter(|facet| {
+        let [a, b] = facet.corners.map(|c| outcome.mesh().points()[c as usize]);
+        let normal = outcome.mesh().facet_normal(&facet.corners);
+        let middle = [0.5 * (a[0] + b[0]) - 24.6, 0.5 * (a[1] + b[1]) - 25.2];
+        (normal[0] * middle[0] + normal[1] * middle[1] > 0.0) == facet.agrees
+    });
+    let count = outward.count();
+    assert!(count == 0 || count == facets.len(), "{count} of {}", facets.len());
+}
+
+#[test]
+fn the_edge_of_a_ball_is_one_closed_surface() {
+    let (centre, radius) = ([17.2, 16.7, 17.4], 11.3);
+    let image = ball([35, 34, 36], centre, radius);
+    let outcome = run(&Method::space(), &image, conforming(4.0, Features::Edges));
+    assert_eq!(outcome.mesh().validate(), Ok(()));
+    let facets = facets_of(&outcome);
+    let shared = sharing(&facets);
+    assert!(shared.values().all(|&count| count == 2));
+    let mut points: Vec<u32> = facets.iter().flat_map(|facet| facet.corners).collect();
+    points.sort_unstable();
+    points.dedup();
+    // Euler: a sphere has corners − edges + faces = 2
+    assert_eq!(points.len() + facets.len(), shared.len() + 2);
+    for &point in &points {
+        let p = outcome.mesh().points()[point as usize];
+        let squares = (0..3).map(|k| (p[k] - centre[k]).powi(2));
+        let off = squares.sum::<f64>().sqrt() - radius;
+        assert!(off.abs() < 0.15, "{off}");
+    }
+    assert!(outcome.improve_report().unwrap().floor_held);
+}
+
+/// Two dark lines that cross in the middle.
+fn cross() -> Image<2> {
+    image([80, 72], |p| {
+        let lines = [[0.28, 0.96], [0.96, -0.28]];
+        let valley = lines.map(|n| {
+            let s: f64 = n[0] * (p[0] - 40.2) + n[1] * (p[1] - 36.4);
+            (-0.5 * s * s).exp()
+        });
+        1.0 - valley[0].max(valley[1])
+    })
+}
+
+#[test]
+fn features_that_cross_stay_two_and_share_their_crossing() {
+    let outcome = run(&Method::plane(), &cross(), conforming(7.0, Features::Dark));
+    let facets = facets_of(&outcome);
+    assert_eq!(outcome.run().pieces().unwrap().len(), 2);
+    let mut at_points: HashMap<u32, Vec<u32>> = HashMap::new();
+    for facet in &facets {
+        facet.corners.iter().for_each(|&c| at_points.entry(c).or_default().push(facet.piece));
+    }
+    let bounds = outcome.bounds().unwrap();
+    for (point, pieces) in at_points {
+        let p = outcome.mesh().points()[point as usize];
+        let on_side = bounds.freedom(&p).count_ones() < 2;
+        match pieces.len() {
+            1 => assert!(on_side, "a line ends at {p:?}"),
+            2 => assert!(!on_side && pieces[0] == pieces[1]),
+            4 => assert!((p[0] - 40.2).hypot(p[1] - 36.4) < 0.3, "lines cross at {p:?}"),
+            count => panic!("{count} facets at {p:?}"),
+        }
+    }
+    let set = outcome.features(&outcome.world_mesh(), &FeatureFacetOptions::default(), &mut Silent);
+    let set = set.unwrap();
+    assert_eq!((set.features.len(), set.intersections.len()), (2, 1));
+    let names: Vec<String> =
+        outcome.tags().unwrap().facet_groups().iter().map(|group| group.name.clone()).collect();
+    assert!(names.contains(&"feature-1".to_string()) && names.contains(&"feature-2".to_string()));
+}
+
+#[test]
+fn a_conforming_mesh_is_the_same_at_any_number_of_threads() {
+    let flat = ball([50, 50], [24.6, 25.2], 15.0);
+    let solid = ball([24, 25, 26], [12.0, 12.3, 12.6], 7.5);
+    let meshes = |threads: usize| {
+        let pool = rayon::ThreadPoolBuilder::new().num_threads(threads).build().unwrap();
+        pool.install(|| {
+            let flat = run(&Method::plane(), &flat, conforming(5.0, Features::Edges));
+            let solid = run(&Method::space(), &solid, conforming(4.0, Features::Edges));
+            (flat.mesh().clone(), solid.mesh().clone())
+        })
+    };
+    let one = meshes(1);
+    assert_eq!(one, meshes(2));
+    assert_eq!(one, meshes(5));
+}
+
+#[test]
+fn fixed_points_stay_where_they_are_beside_features() {
+    let image = ball([50, 50], [24.6, 25.2], 15.0);
+    let seeds = vec![[20.25, 24.5], [40.0, 26.0], [3.5, 7.75]];
+    let options = MeshOptions { seed_points: seeds.clone(), ..conforming(5.0, Features::Edges) };
+    let outcome = run(&Method::plane(), &image, options);
+    for seed in seeds {
+        assert!(outcome.mesh().points().contains(&seed), "{seed:?}");
+    }
+}
+
+#[test]
+fn an_image_without_features_makes_the_mesh_that_it_makes_without_conforming() {
+    let image = image([30, 24], |_| 7.0);
+    let conforming = run(&Method::plane(), &image, conforming(5.0, Features::Edges));
+    assert!(conforming.run().pieces().is_none());
+    let full = MeshOptions {
+        improve: ImproveOptions::for_dimension(2),
+        ..conforming.run().options().clone()
+    };
+    assert_eq!(*conforming.mesh(), *run(&Method::plane(), &image, full).mesh());
+}
