@@ -59,6 +59,7 @@ pub(super) fn feature_atoms<const D: usize>(
     for atom in &mut atoms {
         atom.position = onto_sides(&atom.position, bounds, ON_SIDE * pieces.step());
     }
+    atoms.retain(|atom| keeps_off_sides(&atom.position, bounds, distance));
     let mut atoms = apart(atoms, bounds, distance);
     if D > 2 {
         let held = atoms.len();
@@ -156,31 +157,8 @@ fn settle<const D: usize>(
         for (atom, foot) in atoms[held..].iter_mut().zip(&feet) {
             atom.position = foot.map_or(atom.position, |foot| foot.position);
         }
-        let mut places: Vec<Point<D>> = atoms.iter().map(|atom| atom.position).collect();
-        for _ in 0..ROUNDS {
-            let grid = PointGrid::new(bounds, distance.least(), places.iter().copied());
-            let moved = |(i, foot): (usize, &Option<Foot<D>>)| {
-                let place = places[held + i];
-                let Some(foot) = foot else { return place };
-                let d = distance.at(&place);
-                let mut force = [0.0; D];
-                grid.near(&place, 1.5 * d, |other, j| {
-                    if held + i != j {
-                        add_force(&mut force, &place, other, d);
-                    }
-                });
-                let across = dot(&force, &foot.normal);
-                (0..D).for_each(|k| force[k] -= across * foot.normal[k]);
-                let length = RATE * dot(&force, &force).sqrt();
-                let scale = RATE * d * (LONGEST / length.max(LONGEST));
-                let to = std::array::from_fn(|k| place[k] + scale * force[k]);
-                inner(bounds, d).clamp(&to)
-            };
-            let next: Vec<Point<D>> =
-                (feet.par_iter().enumerate()).with_min_len(1 << 6).map(moved).collect();
-            places[held..].copy_from_slice(&next);
-        }
-        for (atom, place) in atoms[held..].iter_mut().zip(&places[held..]) {
+        let places = pushed(atoms, held, &feet, bounds, distance);
+        for (atom, place) in atoms[held..].iter_mut().zip(&places) {
             atom.position = *place;
         }
     }
@@ -197,6 +175,41 @@ fn settle<const D: usize>(
         atom.position = place.unwrap_or(atom.position);
     }
     Ok(())
+}
+
+/// The places of the atoms from `held` on after some rounds of the pair force in the tangent planes of their feet.
+fn pushed<const D: usize>(
+    atoms: &[FeatureAtom<D>],
+    held: usize,
+    feet: &[Option<Foot<D>>],
+    bounds: &Bounds<D>,
+    distance: &NominalDistance<D>,
+) -> Vec<Point<D>> {
+    let mut places: Vec<Point<D>> = atoms.iter().map(|atom| atom.position).collect();
+    for _ in 0..ROUNDS {
+        let grid = PointGrid::new(bounds, distance.least(), places.iter().copied());
+        let moved = |(i, foot): (usize, &Option<Foot<D>>)| {
+            let place = places[held + i];
+            let Some(foot) = foot else { return place };
+            let d = distance.at(&place);
+            let mut force = [0.0; D];
+            grid.near(&place, 1.5 * d, |other, j| {
+                if held + i != j {
+                    add_force(&mut force, &place, other, d);
+                }
+            });
+            let across = dot(&force, &foot.normal);
+            (0..D).for_each(|k| force[k] -= across * foot.normal[k]);
+            let length = RATE * dot(&force, &force).sqrt();
+            let scale = RATE * d * (LONGEST / length.max(LONGEST));
+            let to = std::array::from_fn(|k| place[k] + scale * force[k]);
+            inner(bounds, d).clamp(&to)
+        };
+        let next: Vec<Point<D>> =
+            (feet.par_iter().enumerate()).with_min_len(1 << 6).map(moved).collect();
+        places[held..].copy_from_slice(&next);
+    }
+    places.split_off(held)
 }
 
 /// The place itself, put on the sides of the box that are nearer than `near`.
@@ -224,6 +237,19 @@ fn is_clear<const D: usize>(
         foot.is_none_or(|foot| {
             foot.beyond > 0.0 || foot.signed_distance(&atom.position).abs() >= clear
         })
+    })
+}
+
+/// Whether a place is on or well within each side of the box: a feature along a side gives way to it.
+fn keeps_off_sides<const D: usize>(
+    place: &Point<D>,
+    bounds: &Bounds<D>,
+    distance: &NominalDistance<D>,
+) -> bool {
+    let inner = inner(bounds, distance.at(place));
+    (0..D).all(|k| {
+        let is_on = place[k] == bounds.min[k] || place[k] == bounds.max[k];
+        is_on || (inner.min[k]..=inner.max[k]).contains(&place[k])
     })
 }
 

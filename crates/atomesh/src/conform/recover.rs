@@ -121,89 +121,147 @@ fn crossing_place<const D: usize>(
 /// enough from the piece's atoms; where nothing can be brought or put, takes away the free ends nearer to the pieces.
 /// Gives the lattice and whether it has changed.
 pub(super) fn recovered<const D: usize>(
-    mut lattice: Lattice<D>,
+    lattice: Lattice<D>,
     crossings: &[Crossing<D>],
     pieces: &Pieces<D>,
     distance: &NominalDistance<D>,
 ) -> (Lattice<D>, bool) {
+    let mut mending = Mending::new(&lattice, pieces, distance);
+    crossings.iter().for_each(|crossing| mending.mend(crossing));
+    let Mending { places, is_touched, new, .. } = mending;
+    if !is_touched.contains(&true) {
+        let goes = ends_that_go(&lattice, crossings, distance);
+        let is_changed = goes.contains(&true);
+        return (lattice.retained(|i| !goes[i]), is_changed);
+    }
+    let is_moved: Vec<bool> =
+        (lattice.atoms().iter().zip(&places)).map(|(from, to)| from != to).collect();
+    let mut lattice = lattice.moved_to(places);
+    for i in (0..is_moved.len()).filter(|&i| is_moved[i]) {
+        lattice.set_temperature(i, 0.0);
+    }
     let bounds = *lattice.bounds();
-    let of_atoms = pieces_at(lattice.atoms(), pieces, &bounds);
-    let all = Bins::of(&bounds, distance.least(), lattice.atoms().iter().copied());
-    let mut on = OnPieces::new(&lattice, &of_atoms, distance);
-    let mut is_touched = vec![false; lattice.len()];
-    let mut atoms = lattice.atoms().to_vec();
-    let mut new: Vec<Point<D>> = Vec::new();
-    for Crossing { ends, heights, piece, place } in crossings {
-        let d = distance.at(place);
+    new.iter().for_each(|place| lattice.push(*place, bounds.freedom(place), 0.0));
+    (lattice, true)
+}
+
+/// What is done about crossings, one after another.
+struct Mending<'a, const D: usize> {
+    lattice: &'a Lattice<D>,
+    pieces: &'a Pieces<D>,
+    distance: &'a NominalDistance<D>,
+    /// The pieces of each atom.
+    of_atoms: Vec<Vec<u32>>,
+    all: Bins<D>,
+    on: OnPieces<D>,
+    /// Where each atom is now.
+    places: Vec<Point<D>>,
+    /// Whether an edge of the atom has been mended.
+    is_touched: Vec<bool>,
+    /// New atoms.
+    new: Vec<Point<D>>,
+}
+
+impl<'a, const D: usize> Mending<'a, D> {
+    fn new(
+        lattice: &'a Lattice<D>,
+        pieces: &'a Pieces<D>,
+        distance: &'a NominalDistance<D>,
+    ) -> Self {
+        let of_atoms = pieces_at(lattice.atoms(), pieces, lattice.bounds());
+        let atoms = lattice.atoms().iter().copied();
+        Self {
+            all: Bins::of(lattice.bounds(), distance.least(), atoms),
+            on: OnPieces::new(lattice, &of_atoms, distance),
+            places: lattice.atoms().to_vec(),
+            is_touched: vec![false; lattice.len()],
+            new: Vec::new(),
+            lattice,
+            pieces,
+            distance,
+            of_atoms,
+        }
+    }
+
+    /// Brings the nearer end onto the piece, or else puts an atom at the crossing.
+    fn mend(&mut self, crossing: &Crossing<D>) {
+        let Crossing { ends, piece, .. } = *crossing;
+        if ends.iter().any(|&end| self.is_touched[end as usize]) {
+            return;
+        }
+        if let Some((end, place)) = self.end_to_bring(crossing) {
+            self.on.add(&place, piece);
+            (self.places[end], self.is_touched[end]) = (place, true);
+        } else if let Some(place) = self.place_for_an_atom(crossing) {
+            self.on.add(&place, piece);
+            ends.iter().for_each(|&end| self.is_touched[end as usize] = true);
+            self.new.push(place);
+        }
+    }
+
+    /// The nearer end and where it comes, if it is free, near the piece, and there is a place.
+    fn end_to_bring(&self, crossing: &Crossing<D>) -> Option<(usize, Point<D>)> {
+        let Crossing { ends, heights, piece, place } = crossing;
+        let (d, bounds) = (self.distance.at(place), self.lattice.bounds());
         let nearer = usize::from(heights[1].abs() < heights[0].abs());
         let end = ends[nearer] as usize;
-        if ends.iter().any(|&end| is_touched[end as usize]) {
-            continue;
+        let is_inner = |freedom: u8| freedom.count_ones() as usize == D;
+        let is_free =
+            self.lattice.temperature(end) > 0.0 && is_inner(self.lattice.freedom_in_box(end));
+        if !is_free || heights[nearer].abs() >= BROUGHT * d {
+            return None;
         }
-        let is_inner = lattice.freedom_in_box(end).count_ones() as usize == D;
-        if lattice.temperature(end) > 0.0 && is_inner && heights[nearer].abs() < BROUGHT * d {
-            let foot = pieces.foot_on(*piece, &atoms[end], d);
-            let to = foot.filter(|foot| foot.beyond == 0.0).map(|foot| foot.position);
-            let to = to.filter(|to| bounds.freedom(to).count_ones() as usize == D);
-            let to = to.filter(|to| !is_near_other(to, *piece, pieces, OTHER * d));
-            if let Some(to) = to.filter(|to| bounds.contains(to) && on.is_clear(to, *piece, d)) {
-                on.add(&to, *piece);
-                (atoms[end], is_touched[end]) = (to, true);
-                continue;
-            }
-        }
-        let place = bounds.clamp(place);
-        // where the edge lies in another piece, the two must share an atom
-        let [a, b] = ends.map(|end| &of_atoms[end as usize]);
-        let shared = a.iter().copied().find(|piece| b.contains(piece));
+        let foot = self.pieces.foot_on(*piece, &self.places[end], d)?;
+        let to = foot.position;
+        let is_good = foot.beyond == 0.0
+            && bounds.contains(&to)
+            && is_inner(bounds.freedom(&to))
+            && !is_near_other(&to, *piece, self.pieces, OTHER * d)
+            && self.on.is_clear(&to, *piece, d);
+        is_good.then_some((end, to))
+    }
+
+    /// The crossing, if an atom there is far enough from all others.
+    fn place_for_an_atom(&self, crossing: &Crossing<D>) -> Option<Point<D>> {
+        let Crossing { ends, piece, place, .. } = crossing;
+        let d = self.distance.at(place);
+        let place = self.lattice.bounds().clamp(place);
         let mut is_alone = true;
-        all.near(&place, ALONE * d, |i| {
-            is_alone &= distance_squared(&lattice.atoms()[i], &place) >= (ALONE * d).powi(2);
+        self.all.near(&place, ALONE * d, |i| {
+            let squared = distance_squared(&self.lattice.atoms()[i], &place);
+            is_alone &= squared >= (ALONE * d).powi(2);
         });
-        let is_clear = match shared {
-            Some(_) => true,
-            None => {
-                on.is_clear(&place, *piece, d) && !is_near_other(&place, *piece, pieces, OTHER * d)
-            }
-        };
-        if is_alone && is_clear {
-            on.add(&place, *piece);
-            ends.iter().for_each(|&end| is_touched[end as usize] = true);
-            new.push(place);
-        }
+        // where the edge lies in another piece, the two must share an atom
+        let [a, b] = ends.map(|end| &self.of_atoms[end as usize]);
+        let is_clear = a.iter().any(|piece| b.contains(piece))
+            || self.on.is_clear(&place, *piece, d)
+                && !is_near_other(&place, *piece, self.pieces, OTHER * d);
+        (is_alone && is_clear).then_some(place)
     }
-    if is_touched.contains(&true) {
-        lattice = lattice.moved_to(atoms);
-        for (i, &is_touched) in is_touched.iter().enumerate() {
-            if is_touched && pieces_at(&lattice.atoms()[i..=i], pieces, &bounds)[0].is_empty() {
-                continue; // an end of an edge with a new atom
-            }
-            if is_touched {
-                lattice.set_temperature(i, 0.0);
-            }
-        }
-        new.iter().for_each(|place| lattice.push(*place, bounds.freedom(place), 0.0));
-        return (lattice, true);
-    }
+}
+
+/// Which atoms go: of each crossing edge the nearer end, or the other one, that is free and not far from the piece.
+fn ends_that_go<const D: usize>(
+    lattice: &Lattice<D>,
+    crossings: &[Crossing<D>],
+    distance: &NominalDistance<D>,
+) -> Vec<bool> {
     let mut goes = vec![false; lattice.len()];
     for Crossing { ends, heights, place, .. } in crossings {
         let nearer = usize::from(heights[1].abs() < heights[0].abs());
-        if heights[nearer].abs() > FAR * distance.at(place) {
+        let is_far = heights[nearer].abs() > FAR * distance.at(place);
+        if is_far || ends.iter().any(|&end| goes[end as usize]) {
             continue;
         }
         let may_go = |end: u32| {
             lattice.temperature(end as usize) > 0.0 && lattice.freedom_in_box(end as usize) != 0
         };
-        if ends.iter().any(|&end| goes[end as usize]) {
-            continue;
-        }
         let end = [ends[nearer], ends[1 - nearer]].into_iter().find(|&end| may_go(end));
         if let Some(end) = end {
             goes[end as usize] = true;
         }
     }
-    let is_changed = goes.contains(&true);
-    (lattice.retained(|i| !goes[i]), is_changed)
+    goes
 }
 
 /// Whether another piece than its own is nearer to a place than `clear`.

@@ -7,41 +7,17 @@
 //! Between its points a piece is what a moving least squares fit of second degree says (Alexa and others 2001): it
 //! averages the noise of single points, and follows curvature.
 
-use std::collections::{HashSet, VecDeque};
+mod link;
+mod meet;
 
-use rayon::prelude::*;
+use std::collections::HashSet;
 
-use super::{Bins, FeaturePoint, PointGrid};
+use super::{FeaturePoint, PointGrid};
 use crate::geometry::linear::solve;
 use crate::geometry::{Bounds, Point, Sets, difference, distance_squared, dot};
 use crate::image::Grid;
+use link::linked_pieces;
 
-/// How far linked points may be apart, over the diagonal of a sample's cell.
-const LINK: f64 = 1.2;
-/// Within how many mean steps points tell whether a point lies on one feature alone.
-const SUPPORT: f64 = 4.0;
-/// The least share of the points near a point that lie on its plane.
-const LEAST_SUPPORT: f64 = 0.7;
-/// Points of one feature near each other have normals with at least this cosine, 21°.
-const ALIKE: f64 = 0.93;
-/// Points with other normals within this, in mean steps, are of a feature that meets the point's own.
-const NEXT: f64 = 2.0;
-/// The greatest share of them.
-const MOST_OTHERS: f64 = 0.12;
-/// The fewest points on a point's plane, itself among them, in the plane; twice as many in space.
-const LEAST_ON: usize = 4;
-/// How far the ends of pieces on one line or plane may be apart where no features meet, in mean steps.
-const GAP: f64 = 5.0;
-/// An end has its neighbours on one side: their mean is farther than this, in mean steps.
-const LOPSIDED: f64 = 1.2;
-/// How far pieces on one line or plane may be apart and still be joined, in mean steps.
-const BRIDGE: f64 = 26.0;
-/// How far from where features meet the ends of pieces are, in mean steps.
-const NEAR_MEETING: f64 = 6.0;
-/// The width of cubes in which one end of a piece is tried, in mean steps.
-const SPARSE: f64 = 1.5;
-/// How far the points between joined pieces are apart, in mean steps.
-const FILL: f64 = 0.8;
 /// The deviation of the weights of a fit, and the radius of its points, in mean steps.
 const FIT_WIDTH: f64 = 1.3;
 const FIT_REACH: f64 = 3.25;
@@ -55,6 +31,8 @@ const FOOT_ROUNDS: usize = 3;
 /// image, and within this of the image's sides, where filters see too little.
 const END: f64 = 1.2;
 const END_AT_SIDE: f64 = 6.0;
+/// How far from its nearest point a piece is looked for, in mean steps.
+const GREATEST_GAP: f64 = 26.0;
 
 /// Pieces of features, in lattice coordinates.
 #[derive(Clone, Debug)]
@@ -99,35 +77,7 @@ impl<const D: usize> Pieces<D> {
     pub fn new(points: Vec<FeaturePoint<D>>, grid: &Grid<D>, least_count: usize) -> Self {
         let step = grid.step.iter().sum::<f64>() / D as f64;
         let bounds = grid.bounds();
-        let (mut points, meetings) = supported(points, &bounds, step);
-        points.sort_by_key(|point| point.index);
-        let diagonal = LINK * dot(&grid.step, &grid.step).sqrt();
-        let bins = PointGrid::new(&bounds, 1.5 * step, points.iter().map(|point| point.position));
-        let mut sets = Sets::new(points.len());
-        let near = |i: usize, reach: f64, is_one: &dyn Fn(usize) -> bool| -> Vec<u32> {
-            let mut found = Vec::new();
-            bins.near(&points[i].position, reach, |_, j| {
-                if j > i && is_one(j) {
-                    found.push(j as u32);
-                }
-            });
-            found
-        };
-        let links: Vec<Vec<u32>> = (0..points.len())
-            .into_par_iter()
-            .with_min_len(1 << 8)
-            .map(|i| near(i, diagonal, &|j| are_linked(&points[i], &points[j], diagonal, step)))
-            .collect();
-        links.iter().enumerate().for_each(|(i, all)| {
-            all.iter().for_each(|&j| sets.join(i as u32, j));
-        });
-        let roots = sets.roots();
-        let bridges = bridges(&points, &roots, &meetings, &bounds, step);
-        for &[i, j] in &bridges {
-            sets.join(i, j);
-        }
-        turn(&mut points, &links, &bridges);
-        fill(&mut points, &mut sets, &bridges, &bounds, step);
+        let (points, mut sets) = linked_pieces(points, grid, step);
         Self::of_sets(points, &mut sets, &bounds, step, least_count)
     }
 
@@ -283,7 +233,7 @@ impl<const D: usize> Pieces<D> {
         if known <= END * self.step {
             return known;
         }
-        let found = self.nearest(x, known.min(BRIDGE * self.step), |other| other == piece);
+        let found = self.nearest(x, known.min(GREATEST_GAP * self.step), |other| other == piece);
         found.map_or(known, |i| distance_squared(&self.points[i].position, x).sqrt())
     }
 
@@ -393,244 +343,6 @@ pub(crate) fn tangents<const D: usize>(normal: &Point<D>) -> [Point<D>; 2] {
         normal[a] * first[b] - normal[b] * first[a]
     });
     [first, second]
-}
-
-/// The points most of whose neighbours lie on their planes, and the places of the others.
-fn supported<const D: usize>(
-    points: Vec<FeaturePoint<D>>,
-    bounds: &Bounds<D>,
-    step: f64,
-) -> (Vec<FeaturePoint<D>>, Vec<Point<D>>) {
-    let bins = PointGrid::new(bounds, 1.5 * step, points.iter().map(|point| point.position));
-    let reach = SUPPORT * step;
-    let is_supported = |point: &FeaturePoint<D>| {
-        let (mut on, mut all, mut others, mut next) = (0usize, 0usize, 0usize, 0usize);
-        bins.near(&point.position, reach, |_, j| {
-            let offset = difference(&points[j].position, &point.position);
-            let squared = dot(&offset, &offset);
-            if squared > reach * reach {
-                return;
-            }
-            let is_next = squared <= (NEXT * step).powi(2);
-            next += usize::from(is_next);
-            if dot(&points[j].normal, &point.normal).abs() < ALIKE {
-                // of another feature, or around a bend
-                others += usize::from(is_next);
-                return;
-            }
-            all += 1;
-            let height = dot(&offset, &point.normal).abs();
-            on += usize::from(height <= 0.12 * squared.sqrt() + 0.3 * step);
-        });
-        on >= LEAST_ON * (D - 1)
-            && others as f64 <= MOST_OTHERS * next as f64
-            && on as f64 >= LEAST_SUPPORT * all as f64
-    };
-    let is_kept: Vec<bool> = points.par_iter().with_min_len(1 << 8).map(is_supported).collect();
-    let (mut kept, mut others) = (Vec::new(), Vec::new());
-    for (point, is_kept) in points.into_iter().zip(is_kept) {
-        if is_kept {
-            kept.push(point);
-        } else {
-            others.push(point.position);
-        }
-    }
-    (kept, others)
-}
-
-/// Whether neighbouring points are of one piece.
-fn are_linked<const D: usize>(
-    a: &FeaturePoint<D>,
-    b: &FeaturePoint<D>,
-    reach: f64,
-    step: f64,
-) -> bool {
-    let offset = difference(&b.position, &a.position);
-    let squared = dot(&offset, &offset);
-    if squared > reach * reach || dot(&a.normal, &b.normal).abs() < 0.8 {
-        return false;
-    }
-    let height = dot(&offset, &a.normal).abs().max(dot(&offset, &b.normal).abs());
-    height <= 0.4 * squared.sqrt() + 0.35 * step
-}
-
-/// Pairs of points, the first the lower, of pieces that go on in each other where features meet: each point near such
-/// a place with the nearest one in line with it across.
-fn bridges<const D: usize>(
-    points: &[FeaturePoint<D>],
-    roots: &[u32],
-    meetings: &[Point<D>],
-    bounds: &Bounds<D>,
-    step: f64,
-) -> Vec<[u32; 2]> {
-    let meeting_bins = PointGrid::new(bounds, 1.5 * step, meetings.iter().copied());
-    let is_end = |point: &FeaturePoint<D>| {
-        let (reach, mut found) = (NEAR_MEETING * step, false);
-        meeting_bins.near(&point.position, reach, |_, i| {
-            found |= distance_squared(&meetings[i], &point.position) <= reach * reach;
-        });
-        found
-    };
-    let is_at_meeting: Vec<bool> = points.par_iter().with_min_len(1 << 8).map(is_end).collect();
-    let bins = PointGrid::new(bounds, 1.5 * step, points.iter().map(|point| point.position));
-    let is_lopsided = |i: usize| {
-        let (mut sum, mut count) = ([0.0; D], 0.0);
-        bins.near(&points[i].position, SUPPORT * step, |_, j| {
-            let offset = difference(&points[j].position, &points[i].position);
-            if roots[i] == roots[j] && dot(&offset, &offset) <= (SUPPORT * step).powi(2) {
-                (0..D).for_each(|k| sum[k] += offset[k]);
-                count += 1.0;
-            }
-        });
-        dot(&sum, &sum).sqrt() > LOPSIDED * step * count
-    };
-    let mut ends: Vec<u32> = (0..points.len() as u32)
-        .into_par_iter()
-        .with_min_len(1 << 8)
-        .filter(|&i| is_at_meeting[i as usize] || is_lopsided(i as usize))
-        .collect();
-    let mut seen = HashSet::new();
-    ends.retain(|&i| {
-        let cube = points[i as usize].position.map(|x| (x / (SPARSE * step)) as i64);
-        seen.insert((cube, roots[i as usize]))
-    });
-    let even = |&i: &u32| evened(i as usize, points, roots, &bins, step);
-    let evened: Vec<FeaturePoint<D>> = ends.par_iter().with_min_len(1 << 6).map(even).collect();
-    let end_bins = PointGrid::new(bounds, 3.0 * step, evened.iter().map(|point| point.position));
-    let across = |at: usize| {
-        let (own, point) = (ends[at], &evened[at]);
-        let reach = step * if is_at_meeting[own as usize] { BRIDGE } else { GAP };
-        let mut best = (reach * reach, None);
-        end_bins.near(&point.position, reach, |_, j| {
-            let other = ends[j];
-            let found = (distance_squared(&evened[j].position, &point.position), Some(other));
-            if roots[own as usize] != roots[other as usize]
-                && found < best
-                && are_in_line(point, &evened[j], reach, step)
-            {
-                best = found;
-            }
-        });
-        best.1.map(|other| [own.min(other), own.max(other)])
-    };
-    let mut found: Vec<[u32; 2]> =
-        (0..ends.len()).into_par_iter().with_min_len(1 << 6).filter_map(across).collect();
-    found.sort_unstable();
-    found.dedup();
-    found
-}
-
-/// A point with the mean of the normals of its piece near it.
-fn evened<const D: usize>(
-    i: usize,
-    points: &[FeaturePoint<D>],
-    roots: &[u32],
-    bins: &PointGrid<D>,
-    step: f64,
-) -> FeaturePoint<D> {
-    let (point, reach) = (points[i], SUPPORT * step);
-    let mut sum = [0.0; D];
-    bins.near(&point.position, reach, |_, j| {
-        let cosine = dot(&points[j].normal, &point.normal);
-        let is_near = distance_squared(&points[j].position, &point.position) <= reach * reach;
-        if is_near && roots[i] == roots[j] && cosine.abs() > 0.85 {
-            (0..D).for_each(|k| sum[k] += cosine.signum() * points[j].normal[k]);
-        }
-    });
-    let length = dot(&sum, &sum).sqrt();
-    FeaturePoint { normal: sum.map(|x| x / length), ..point }
-}
-
-/// Adds points between joined pieces, in the sets of the pieces.
-fn fill<const D: usize>(
-    points: &mut Vec<FeaturePoint<D>>,
-    sets: &mut Sets,
-    bridges: &[[u32; 2]],
-    bounds: &Bounds<D>,
-    step: f64,
-) {
-    let spacing = FILL * step;
-    let mut bins = Bins::of(bounds, step, points.iter().map(|point| point.position));
-    for &[i, j] in bridges {
-        let (a, b) = (points[i as usize], points[j as usize]);
-        let length = distance_squared(&a.position, &b.position).sqrt();
-        let count = (length / spacing) as usize + 1;
-        for n in 1..count {
-            let t = n as f64 / count as f64;
-            let mix = |x: &Point<D>, y: &Point<D>| -> Point<D> {
-                std::array::from_fn(|k| (1.0 - t) * x[k] + t * y[k])
-            };
-            let (position, normal) = (mix(&a.position, &b.position), mix(&a.normal, &b.normal));
-            let length = dot(&normal, &normal).sqrt();
-            let normal = normal.map(|x| x / length);
-            let mut is_free = true;
-            let root = sets.root(i);
-            bins.near(&position, spacing, |k| {
-                is_free &= distance_squared(&points[k].position, &position) >= spacing * spacing
-                    || sets.root(k as u32) != root;
-            });
-            if is_free {
-                bins.push(&position);
-                sets.push();
-                sets.join(i, points.len() as u32);
-                points.push(FeaturePoint {
-                    index: a.index,
-                    position,
-                    normal,
-                    strength: (1.0 - t) * a.strength + t * b.strength,
-                });
-            }
-        }
-    }
-}
-
-/// Whether points of two pieces lie on one line or plane.
-fn are_in_line<const D: usize>(
-    a: &FeaturePoint<D>,
-    b: &FeaturePoint<D>,
-    reach: f64,
-    step: f64,
-) -> bool {
-    let offset = difference(&b.position, &a.position);
-    let squared = dot(&offset, &offset);
-    if squared > reach * reach || dot(&a.normal, &b.normal).abs() < 0.96 {
-        return false;
-    }
-    let height = dot(&offset, &a.normal).abs().max(dot(&offset, &b.normal).abs());
-    height <= 0.08 * squared.sqrt() + 0.4 * step
-}
-
-/// Turns the normals of linked points to the same side, from the first point of each piece on.
-fn turn<const D: usize>(points: &mut [FeaturePoint<D>], links: &[Vec<u32>], bridges: &[[u32; 2]]) {
-    let mut around = vec![Vec::new(); points.len()];
-    let links = links.iter().enumerate();
-    let links = links.flat_map(|(i, all)| all.iter().map(move |&j| [i as u32, j]));
-    for [i, j] in links.chain(bridges.iter().copied()) {
-        around[i as usize].push(j);
-        around[j as usize].push(i);
-    }
-    let mut is_turned = vec![false; points.len()];
-    let mut next = VecDeque::new();
-    for first in 0..points.len() {
-        if is_turned[first] {
-            continue;
-        }
-        is_turned[first] = true;
-        next.push_back(first);
-        while let Some(i) = next.pop_front() {
-            let normal = points[i].normal;
-            for &j in &around[i] {
-                let j = j as usize;
-                if !is_turned[j] {
-                    is_turned[j] = true;
-                    if dot(&normal, &points[j].normal) < 0.0 {
-                        points[j].normal = points[j].normal.map(|n| -n);
-                    }
-                    next.push_back(j);
-                }
-            }
-        }
-    }
 }
 
 #[cfg(test)]
