@@ -55,10 +55,11 @@ fn links<const D: usize>(
     step: f64,
 ) -> Vec<Vec<u32>> {
     let grid = PointGrid::new(bounds, 1.5 * step, points.iter().map(|point| point.position));
+    let alike = Alike { reach, cosine: 0.8, slope: 0.4, slack: 0.35 };
     let of = |i: usize| {
         let mut found = Vec::new();
         grid.near(&points[i].position, reach, |_, j| {
-            if j > i && are_linked(&points[i], &points[j], reach, step) {
+            if j > i && alike.holds(&points[i], &points[j], step) {
                 found.push(j as u32);
             }
         });
@@ -110,20 +111,34 @@ fn supported<const D: usize>(
     (kept, others)
 }
 
-/// Whether neighbouring points are of one piece.
-fn are_linked<const D: usize>(
-    a: &FeaturePoint<D>,
-    b: &FeaturePoint<D>,
-    reach: f64,
-    step: f64,
-) -> bool {
-    let offset = difference(&b.position, &a.position);
-    let squared = dot(&offset, &offset);
-    if squared > reach * reach || dot(&a.normal, &b.normal).abs() < 0.8 {
-        return false;
+/// How far two points may be apart and differ and still be of one piece.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct Alike {
+    /// Their greatest distance.
+    pub reach: f64,
+    /// The least cosine between their normals.
+    pub cosine: f64,
+    /// How far one may be off the other's plane, over their distance, and in addition to it, in mean steps.
+    pub slope: f64,
+    pub slack: f64,
+}
+
+impl Alike {
+    /// Whether two points are on one line or plane.
+    pub fn holds<const D: usize>(
+        &self,
+        a: &FeaturePoint<D>,
+        b: &FeaturePoint<D>,
+        step: f64,
+    ) -> bool {
+        let offset = difference(&b.position, &a.position);
+        let squared = dot(&offset, &offset);
+        if squared > self.reach * self.reach || dot(&a.normal, &b.normal).abs() < self.cosine {
+            return false;
+        }
+        let height = dot(&offset, &a.normal).abs().max(dot(&offset, &b.normal).abs());
+        height <= self.slope * squared.sqrt() + self.slack * step
     }
-    let height = dot(&offset, &a.normal).abs().max(dot(&offset, &b.normal).abs());
-    height <= 0.4 * squared.sqrt() + 0.35 * step
 }
 
 /// Turns the normals of linked points to the same side, from the first point of each piece on.

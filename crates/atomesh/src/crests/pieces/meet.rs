@@ -5,7 +5,7 @@ use std::collections::HashSet;
 use rayon::prelude::*;
 
 use super::super::{Bins, FeaturePoint, PointGrid};
-use super::link::SUPPORT;
+use super::link::{Alike, SUPPORT};
 use crate::geometry::{Bounds, Point, Sets, difference, distance_squared, dot};
 
 /// How far pieces on one line or plane may be apart and still be joined, in mean steps.
@@ -43,12 +43,13 @@ pub(super) fn bridges<const D: usize>(
     let ends = ends(points, roots, meetings, bounds, step);
     let grid = PointGrid::new(bounds, 3.0 * step, ends.iter().map(|end| end.point.position));
     let across = |end: &End<D>| {
+        let alike = Alike { reach: end.reach, cosine: 0.96, slope: 0.08, slack: 0.4 };
         let mut best = (end.reach * end.reach, None);
         grid.near(&end.point.position, end.reach, |place, j| {
             let found = (distance_squared(place, &end.point.position), Some(ends[j].number));
             if roots[end.number as usize] != roots[ends[j].number as usize]
                 && found < best
-                && are_in_line(&end.point, &ends[j].point, end.reach, step)
+                && alike.holds(&end.point, &ends[j].point, step)
             {
                 best = found;
             }
@@ -171,20 +172,4 @@ pub(super) fn fill<const D: usize>(
             }
         }
     }
-}
-
-/// Whether points of two pieces lie on one line or plane.
-fn are_in_line<const D: usize>(
-    a: &FeaturePoint<D>,
-    b: &FeaturePoint<D>,
-    reach: f64,
-    step: f64,
-) -> bool {
-    let offset = difference(&b.position, &a.position);
-    let squared = dot(&offset, &offset);
-    if squared > reach * reach || dot(&a.normal, &b.normal).abs() < 0.96 {
-        return false;
-    }
-    let height = dot(&offset, &a.normal).abs().max(dot(&offset, &b.normal).abs());
-    height <= 0.08 * squared.sqrt() + 0.4 * step
 }
