@@ -292,7 +292,9 @@ pub(super) fn brought_near<const D: usize>(
         let mut feet = near.into_iter().filter_map(|piece| pieces.foot_on(piece, atom, 2.0 * step));
         let foot =
             feet.find(|foot| foot.beyond == 0.0 && foot.signed_distance(atom).abs() <= ON * step)?;
-        (bounds.freedom(&foot.position).count_ones() as usize == D).then_some(foot.position)
+        let to = foot.position;
+        let is_inner = bounds.contains(&to) && bounds.freedom(&to).count_ones() as usize == D;
+        is_inner.then_some(to)
     };
     let places: Vec<Option<Point<D>>> =
         (0..lattice.len()).into_par_iter().with_min_len(1 << 8).map(to).collect();

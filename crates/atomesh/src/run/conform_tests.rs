@@ -210,3 +210,21 @@ fn an_image_without_features_makes_the_mesh_that_it_makes_without_conforming() {
     };
     assert_eq!(*conforming.mesh(), *run(&Method::plane(), &image, full).mesh());
 }
+
+#[test]
+fn what_cannot_conform_is_said() {
+    let image = ball([30, 28], [14.6, 14.2], 8.0);
+    let warnings = |options: MeshOptions<2>| {
+        let prepared = prepare(&Method::plane(), Inputs::image(&image), options, &mut Silent);
+        prepared.unwrap().warnings().to_vec()
+    };
+    let repelling = FeatureOptions { features: Features::Edges, repel: true, ..Default::default() };
+    for options in [
+        MeshOptions { features: repelling, ..conforming(5.0, Features::Edges) },
+        MeshOptions { kind: MeshKind::Voronoi, ..conforming(5.0, Features::Edges) },
+        conforming(0.7, Features::Edges),
+    ] {
+        assert!(matches!(warnings(options)[..], [Warning::NotConforming { .. }]));
+    }
+    assert_eq!(warnings(conforming(5.0, Features::Edges)), []);
+}

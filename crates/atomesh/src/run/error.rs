@@ -168,6 +168,12 @@ pub enum Warning {
     /// The image has no features of the kind asked for.
     #[error("the image has no features of this kind: the mesh is regular")]
     Constant,
+    /// Facets were to conform to features, and do not.
+    #[error("atoms do not conform to features: {why}")]
+    NotConforming {
+        /// What stands in the way.
+        why: &'static str,
+    },
     /// d is larger than the box.
     #[error("the nominal distance {distance} exceeds the box, {extent} along {}: the mesh is as coarse as can be", ["x", "y", "z"][*axis])]
     Coarse {

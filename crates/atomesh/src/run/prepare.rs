@@ -58,13 +58,13 @@ pub(super) fn prepare<const D: usize>(
     warnings.extend(coarse(&grid, &distance));
     check(watch, Phase::Distance, 1.0, None)?;
     let potential = ScalarField::potential(grid, samples, options.interpolation)?;
-    let attracts = options.kind == MeshKind::Delaunay && !options.features.repel;
-    let pieces = match options.improve.align {
-        Align::Conform if attracts && !is_masked => {
-            pieces(&inputs, &options, &potential, &distance, watch)?
+    let mut pieces = None;
+    if options.improve.align == Align::Conform {
+        match why_not(&options, &grid, &distance, is_masked) {
+            Some(why) => warnings.push(Warning::NotConforming { why }),
+            None => pieces = find_pieces(&inputs, &options, &potential, &distance, watch)?,
         }
-        _ => None,
-    };
+    }
     let fields = Fields::new(potential, weight, distance)?;
     let method = method.clone();
     Ok(Prepared::new(Parts {
@@ -110,8 +110,28 @@ fn coarse<const D: usize>(grid: &Grid<D>, distance: &NominalDistance<D>) -> Opti
     Some(Warning::Coarse { axis, distance, extent: extent[axis] })
 }
 
+/// Why atoms cannot conform to features, if they cannot.
+fn why_not<const D: usize>(
+    options: &MeshOptions<D>,
+    grid: &Grid<D>,
+    distance: &NominalDistance<D>,
+    is_masked: bool,
+) -> Option<&'static str> {
+    let mean_step = grid.step.iter().sum::<f64>() / D as f64;
+    if options.kind != MeshKind::Delaunay {
+        return Some("they are put beside them, for Voronoi cells");
+    }
+    if options.features.repel {
+        return Some("these repel");
+    }
+    if is_masked {
+        return Some("within a mask they cannot yet");
+    }
+    (distance.least() < mean_step).then_some("edges are shorter than the mean step of samples")
+}
+
 /// The pieces of features, if there are any.
-fn pieces<const D: usize>(
+fn find_pieces<const D: usize>(
     inputs: &Inputs<'_, D>,
     options: &MeshOptions<D>,
     potential: &ScalarField<D>,
