@@ -31,7 +31,7 @@ use crate::watch::{Cancelled, Phase, Watch, check};
 
 use atoms::{FeatureAtom, feature_atoms};
 pub use facets::{FeatureFacet, feature_facets};
-use recover::{brought_near, crossings, recovered};
+use recover::{Heights, brought_near, crossings, recovered};
 
 /// The least distance of other atoms from those on features, over d: before they settle, and after.
 const CLEAR: [f64; 2] = [0.7, 0.55];
@@ -186,11 +186,12 @@ pub fn connect<const D: usize>(
     delaunay: &Delaunay<D>,
     watch: &mut dyn Watch,
 ) -> Result<(Lattice<D>, Mesh<D>), ConnectError> {
+    let mut known = Heights::default();
     for _ in 0..RECOVER_ROUNDS {
         lattice = brought_near(lattice, pieces);
         let mesh = delaunay.connect(lattice.atoms(), watch)?;
         check(watch, Phase::Connect, 0.5, None)?;
-        let crossings = crossings(&mesh, pieces, distance);
+        let crossings = crossings(&mesh, pieces, distance, &mut known);
         if crossings.is_empty() {
             return Ok((lattice, mesh));
         }

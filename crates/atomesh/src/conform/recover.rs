@@ -1,5 +1,7 @@
 //! Edges that cross features, and what is done about them.
 
+use std::collections::HashMap;
+
 use rayon::prelude::*;
 
 use crate::crests::{Bins, Pieces};
@@ -37,26 +39,46 @@ pub(super) struct Crossing<const D: usize> {
     pub place: Point<D>,
 }
 
+/// How far atoms are from the pieces near them, kept from round to round: most atoms stay where they are.
+#[derive(Default)]
+pub(super) struct Heights<const D: usize>(HashMap<[u64; D], Vec<(u32, f64)>>);
+
+impl<const D: usize> Heights<D> {
+    /// The piece and the signed distance for each piece near each point.
+    fn of(
+        &mut self,
+        points: &[Point<D>],
+        pieces: &Pieces<D>,
+        distance: &NominalDistance<D>,
+    ) -> Vec<Vec<(u32, f64)>> {
+        let key = |p: &Point<D>| p.map(f64::to_bits);
+        let unknown: Vec<Point<D>> =
+            points.iter().filter(|p| !self.0.contains_key(&key(p))).copied().collect();
+        let of = |p: &Point<D>| {
+            let reach = NEAR * distance.at(p) + 3.0 * pieces.step();
+            let height = |piece: u32| {
+                let foot = pieces.foot_on(piece, p, reach)?;
+                Some((piece, foot.signed_distance(p)))
+            };
+            let heights = pieces.near(p, reach).into_iter().filter_map(height).collect();
+            (key(p), heights)
+        };
+        let found: Vec<_> = unknown.par_iter().with_min_len(1 << 6).map(of).collect();
+        self.0.extend(found);
+        points.iter().map(|p| self.0[&key(p)].clone()).collect()
+    }
+}
+
 /// The edges that cross a piece between their ends, ascending by ends.
 pub(super) fn crossings<const D: usize>(
     mesh: &Mesh<D>,
     pieces: &Pieces<D>,
     distance: &NominalDistance<D>,
+    known: &mut Heights<D>,
 ) -> Vec<Crossing<D>> {
     let points = mesh.points();
     let step = pieces.step();
-    // how far each point is from each piece near it
-    let heights: Vec<Vec<(u32, f64)>> = (points.par_iter())
-        .with_min_len(1 << 8)
-        .map(|p| {
-            let reach = NEAR * distance.at(p) + 3.0 * step;
-            let height = |piece: u32| {
-                let foot = pieces.foot_on(piece, p, reach)?;
-                Some((piece, foot.signed_distance(p)))
-            };
-            pieces.near(p, reach).into_iter().filter_map(height).collect()
-        })
-        .collect();
+    let heights = known.of(points, pieces, distance);
     let mut edges: Vec<[u32; 2]> = Vec::new();
     for cell in mesh.cells() {
         for (i, &a) in cell.iter().enumerate() {

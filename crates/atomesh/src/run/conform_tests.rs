@@ -214,17 +214,20 @@ fn an_image_without_features_makes_the_mesh_that_it_makes_without_conforming() {
 #[test]
 fn what_cannot_conform_is_said() {
     let image = ball([30, 28], [14.6, 14.2], 8.0);
-    let warnings = |options: MeshOptions<2>| {
-        let prepared = prepare(&Method::plane(), Inputs::image(&image), options, &mut Silent);
+    let warnings = |image: &Image<2>, options: MeshOptions<2>| {
+        let prepared = prepare(&Method::plane(), Inputs::image(image), options, &mut Silent);
         prepared.unwrap().warnings().to_vec()
     };
+    let conforming = |size: f64| conforming(size, Features::Edges);
     let repelling = FeatureOptions { features: Features::Edges, repel: true, ..Default::default() };
-    for options in [
-        MeshOptions { features: repelling, ..conforming(5.0, Features::Edges) },
-        MeshOptions { kind: MeshKind::Voronoi, ..conforming(5.0, Features::Edges) },
-        conforming(0.7, Features::Edges),
+    let coarse = image.frame().with_spacing([1.0, 3.0]).unwrap();
+    let coarse = Image::new(coarse, image.samples().clone()).unwrap();
+    for (image, options) in [
+        (&image, MeshOptions { features: repelling, ..conforming(5.0) }),
+        (&image, MeshOptions { kind: MeshKind::Voronoi, ..conforming(5.0) }),
+        (&coarse, conforming(1.5)),
     ] {
-        assert!(matches!(warnings(options)[..], [Warning::NotConforming { .. }]));
+        assert!(matches!(warnings(image, options)[..], [Warning::NotConforming { .. }]));
     }
-    assert_eq!(warnings(conforming(5.0, Features::Edges)), []);
+    assert_eq!(warnings(&image, conforming(5.0)), []);
 }
