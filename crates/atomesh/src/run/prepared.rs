@@ -117,7 +117,19 @@ impl<const D: usize> Prepared<D> {
         let smooth = options.optimize.smoothing_steps > 0;
         // looking for crests takes two volumes and a copy of the potential
         let mirrored = self.pairs_atoms() && self.potential().range().1 > 0.0;
-        let copies = [field, spline, smooth, smooth && spline, mirrored, mirrored, mirrored];
+        // b without what atoms stand on
+        let conforming = self.0.pieces.is_some();
+        let copies = [
+            field,
+            spline,
+            smooth,
+            smooth && spline,
+            mirrored,
+            mirrored,
+            mirrored,
+            conforming,
+            conforming && spline,
+        ];
         let copies = copies.into_iter().filter(|&c| c).count();
         Estimate::new::<D>(grid.sample_count(), atoms, 1 + copies)
     }

@@ -117,6 +117,9 @@ impl Aligner<'_> {
                 continue;
             };
             let trial = self.trial_of(tetrahedra, &stray, &around.points);
+            if trial.points.iter().any(|&point| tetrahedra.is_on_held[point as usize]) {
+                continue; // the copy does not know which facets stay
+            }
             let mut tried = Effort::default();
             let Some(better) = self.better(&trial, tetrahedra, &mut tried) else { continue };
             self.put_back(tetrahedra, &better);

@@ -19,6 +19,8 @@ pub(super) struct Tetrahedra {
     pub freedom: Vec<u8>,
     /// Bit k of a point: it lies where axis k is least in the box; bit 3 + k: where it is greatest.
     pub sides: Vec<u8>,
+    /// Whether a point is a corner of a facet that stays within the part.
+    pub is_on_held: Vec<bool>,
     /// The corners of a cell, in positive orientation; of a dead cell [`NONE`].
     pub corners: Vec<[u32; 4]>,
     pub neighbours: Vec<[u32; 4]>,
@@ -77,7 +79,10 @@ impl Tetrahedra {
         for (cell, corners) in corners.iter().enumerate() {
             corners.iter().for_each(|&c| cell_of[c as usize] = cell as u32);
         }
+        let mut is_on_held = vec![false; points.len()];
+        held.iter().flatten().for_each(|&c| is_on_held[c as usize] = true);
         let mut tetrahedra = Self {
+            is_on_held,
             seen: vec![0; corners.len()],
             shapes: Vec::with_capacity(corners.len()),
             points,
