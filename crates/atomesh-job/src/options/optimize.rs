@@ -85,9 +85,10 @@ section! {
     pub struct ImprovementOptions {
         /// Turn the edges (2-D) or faces (3-D) of the mesh onto features: not at all (off), by swaps alone, by
         /// swaps and moves of points (full), or by atoms that stand on features before all others, so that each
-        /// feature is one line or sheet of them, tagged (conform). Default: full
+        /// feature is one line or sheet of them, tagged (conform); or conform where features are clean, full
+        /// where they are ragged (auto). Default: auto
         #[arg(long, value_name = "HOW",
-            value_parser = named::<Align>(&["off", "swaps", "full", "conform"]))]
+            value_parser = named::<Align>(&["auto", "off", "swaps", "full", "conform"]))]
         pub align: Align,
         /// Least angle in degrees that swaps and moves keep or restore: interior angles, below 60, in
         /// 2-D; dihedral angles, below 70.5, in 3-D. Default: 20 in 2-D, 15 in 3-D

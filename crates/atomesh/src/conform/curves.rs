@@ -1,5 +1,7 @@
 //! All curves of all pieces, where they meet, and the atoms on them.
 
+use rayon::prelude::*;
+
 use crate::crests::{Bins, Pieces};
 use crate::fields::NominalDistance;
 use crate::geometry::{Bounds, Point, difference, distance_squared, dot};
@@ -9,6 +11,10 @@ use super::trace::{Curve, Cut, End, Tracer};
 
 /// A curve or a part of one shorter than this, over d, has no atoms of its own.
 const LEAST_LENGTH: f64 = 0.75;
+/// Curves are looked for this near to the places of pieces, over how far apart these are, and found at most so many mean
+/// steps away.
+const NEAR: f64 = 0.75;
+const FARTHEST_START: f64 = 5.0;
 /// Ends nearer to another curve than this, over d, are joined to it.
 const JOIN: f64 = 0.6;
 
@@ -130,72 +136,95 @@ fn traced<const D: usize>(
     bounds: &Bounds<D>,
     distance: &NominalDistance<D>,
 ) -> Vec<Curve<D>> {
-    let tracer = Tracer { pieces, bounds: *bounds };
-    let mut curves: Vec<Curve<D>> = Vec::new();
-    for cut in cuts::<D>(bounds) {
-        follow_all(&tracer, cut, distance, &mut curves);
-    }
-    if D > 2 {
-        for other in 0..pieces.len() as u32 {
-            follow_all(&tracer, Cut::Piece(other), distance, &mut curves);
-        }
-    }
-    curves
-}
-
-/// What makes curves, but for other pieces.
-fn cuts<const D: usize>(bounds: &Bounds<D>) -> Vec<Cut> {
+    let mut curves = Follower::new(pieces, bounds, distance);
+    let places: Vec<(Point<D>, u32)> = pieces.places().collect();
+    let near = NEAR * pieces.apart() * pieces.step();
     if D == 2 {
-        return vec![Cut::None];
+        curves.follow(Cut::None, places.iter());
+    } else {
+        let sides = (0..D).flat_map(|axis| [(axis, bounds.min[axis]), (axis, bounds.max[axis])]);
+        for (axis, level) in sides {
+            let is_near = |(place, _): &&(Point<D>, u32)| (place[axis] - level).abs() <= near;
+            curves.follow(Cut::Side { axis, level }, places.iter().filter(is_near));
+        }
+        for (other, starts) in meetings(pieces, &places, near).iter().enumerate() {
+            let starts = starts.iter().map(|&i| &places[i as usize]);
+            curves.follow(Cut::Piece(other as u32), starts);
+        }
     }
-    let sides = (0..D).flat_map(|axis| [(axis, bounds.min[axis]), (axis, bounds.max[axis])]);
-    sides.map(|(axis, level)| Cut::Side { axis, level }).collect()
+    curves.curves
 }
 
-/// Follows every curve of a kind that no curve before it goes along.
-fn follow_all<const D: usize>(
-    tracer: &Tracer<'_, D>,
-    cut: Cut,
-    distance: &NominalDistance<D>,
-    curves: &mut Vec<Curve<D>>,
-) {
-    let (pieces, step) = (tracer.pieces, tracer.pieces.step());
-    let is_near = |p: &Point<D>, piece: u32| match cut {
-        Cut::None => true,
-        Cut::Side { axis, level } => (p[axis] - level).abs() <= 1.5 * step,
-        Cut::Piece(other) => {
-            piece < other
-                && pieces
-                    .foot_on(other, p, 2.0 * step)
-                    .is_some_and(|foot| foot.beyond == 0.0 && foot.signed_distance(p).abs() < step)
-        }
-    };
-    let count = pieces.points().len();
-    let mut walked = Bins::new(&tracer.bounds, step, count);
-    let mut walked_places: Vec<(Point<D>, u32)> = Vec::new();
-    for (point, piece) in pieces.points() {
-        if !is_near(&point.position, piece) {
-            continue;
-        }
-        let Some((start, _)) = tracer.onto(piece, cut, &point.position) else { continue };
-        if distance_squared(&start, &point.position) > 9.0 * step * step {
-            continue;
-        }
-        let mut is_walked = false;
-        walked.near(&start, 1.5 * step, |i| {
-            let (place, on) = &walked_places[i];
-            is_walked |= *on == piece && distance_squared(place, &start) < (1.5 * step).powi(2);
+/// For each piece the places on those before it that are near to it.
+fn meetings<const D: usize>(
+    pieces: &Pieces<D>,
+    places: &[(Point<D>, u32)],
+    near: f64,
+) -> Vec<Vec<u32>> {
+    let others = |(place, piece): &(Point<D>, u32)| {
+        let mut others = pieces.near(place, near);
+        others.retain(|&other| {
+            *piece < other
+                && pieces.foot_on(other, place, near).is_some_and(|foot| {
+                    foot.beyond == 0.0 && foot.signed_distance(place).abs() < near
+                })
         });
-        if is_walked {
-            continue;
+        others
+    };
+    let found: Vec<Vec<u32>> = places.par_iter().with_min_len(1 << 7).map(others).collect();
+    let mut of_pieces = vec![Vec::new(); pieces.len()];
+    for (i, others) in found.iter().enumerate() {
+        others.iter().for_each(|&other| of_pieces[other as usize].push(i as u32));
+    }
+    of_pieces
+}
+
+/// Follows curves, each once.
+struct Follower<'a, const D: usize> {
+    tracer: Tracer<'a, D>,
+    distance: &'a NominalDistance<D>,
+    curves: Vec<Curve<D>>,
+    /// The places of the curves followed, those too short among them, with their pieces and what made them.
+    walked: Vec<(Point<D>, u32, Cut)>,
+    bins: Bins<D>,
+}
+
+impl<'a, const D: usize> Follower<'a, D> {
+    fn new(pieces: &'a Pieces<D>, bounds: &Bounds<D>, distance: &'a NominalDistance<D>) -> Self {
+        Self {
+            tracer: Tracer { pieces, bounds: *bounds },
+            distance,
+            curves: Vec::new(),
+            walked: Vec::new(),
+            bins: Bins::new(bounds, pieces.step(), pieces.points().len()),
         }
-        let Some(curve) = tracer.curve(piece, cut, &start) else { continue };
-        for place in &curve.places {
-            walked.push(place);
-            walked_places.push((*place, piece));
-        }
-        if length_of(&curve.places) >= LEAST_LENGTH * distance.at(&start) {
-            curves.push(curve);
+    }
+
+    /// Follows every curve of a kind near `starts` that no curve before it goes along.
+    fn follow<'b>(&mut self, cut: Cut, starts: impl Iterator<Item = &'b (Point<D>, u32)>) {
+        let step = self.tracer.pieces.step();
+        for &(near, piece) in starts {
+            let Some((start, _)) = self.tracer.onto(piece, cut, &near) else { continue };
+            if distance_squared(&start, &near) > (FARTHEST_START * step).powi(2) {
+                continue;
+            }
+            let mut is_walked = false;
+            self.bins.near(&start, 1.5 * step, |i| {
+                let (place, on, by) = &self.walked[i];
+                is_walked |= (*on, *by) == (piece, cut)
+                    && distance_squared(place, &start) < (1.5 * step).powi(2);
+            });
+            if is_walked {
+                continue;
+            }
+            let Some(curve) = self.tracer.curve(piece, cut, &start) else { continue };
+            for place in &curve.places {
+                self.bins.push(place);
+                self.walked.push((*place, piece, cut));
+            }
+            if length_of(&curve.places) >= LEAST_LENGTH * self.distance.at(&start) {
+                self.curves.push(curve);
+            }
         }
     }
 }

@@ -57,6 +57,15 @@ pub(super) fn pieces_at<const D: usize>(
     places.par_iter().with_min_len(1 << 8).map(of).collect()
 }
 
+/// Whether each place lies on a piece: atoms there stay where they are while a mesh is improved.
+pub(crate) fn are_on_pieces<const D: usize>(
+    places: &[Point<D>],
+    pieces: &Pieces<D>,
+    bounds: &Bounds<D>,
+) -> Vec<bool> {
+    pieces_at(places, pieces, bounds).iter().map(|on| !on.is_empty()).collect()
+}
+
 /// The facets of all pieces, ascending by corners; a facet of several pieces is the strongest's.
 pub fn feature_facets<const D: usize>(
     mesh: &Mesh<D>,

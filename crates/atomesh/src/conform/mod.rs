@@ -21,7 +21,7 @@ mod trace;
 
 use rayon::prelude::*;
 
-use crate::crests::{Bins, Pieces};
+use crate::crests::{Bins, Pieces, PointGrid};
 use crate::fields::{FieldsView, NominalDistance, ScalarField};
 use crate::geometry::{Point, distance_squared};
 use crate::lattice::{Lattice, LatticeError, Scatterer, fill_holes};
@@ -30,6 +30,7 @@ use crate::optimize::{OptimizeError, OptimizeOptions, OptimizeReport, optimize};
 use crate::watch::{Cancelled, Phase, Watch, check};
 
 use atoms::{FeatureAtom, feature_atoms};
+pub(crate) use facets::are_on_pieces;
 pub use facets::{FeatureFacet, feature_facets};
 use recover::{Heights, brought_near, crossings, recovered};
 
@@ -37,6 +38,8 @@ use recover::{Heights, brought_near, crossings, recovered};
 const CLEAR: [f64; 2] = [0.7, 0.55];
 /// The same for atoms on the sides of the box.
 const CLEAR_SIDE: [f64; 2] = [0.5, 0.4];
+/// A piece is met where one of the places at which it is met is nearer than this, over d.
+const MET: f64 = 0.75;
 /// How far from pieces b no longer counts, over d, and in mean steps.
 const CLEARED: f64 = 0.6;
 const CLEARED_STEPS: f64 = 3.0;
@@ -103,26 +106,38 @@ pub fn conform<const D: usize>(
     let lattice = fill_holes(scatterer, lattice, distance, FILL_ROUNDS, watch)?;
     let lattice = without_near(lattice.along_curve(), &atoms, distance, 1);
     let options = OptimizeOptions { smoothing_steps: 0, ..options.clone() };
-    let rest = without_pieces(fields.potential, pieces, distance);
+    let met = atoms.iter().map(|atom| atom.position).collect::<Vec<_>>();
+    let rest = without_met(fields.potential, pieces, &met, distance);
     let fields = FieldsView { potential: &rest, ..fields };
     let settled = optimize(lattice, fields, &options, watch)?;
     let (lattice, report) = settled.into_parts();
     Ok((without_near(lattice, &atoms, distance, 1), report))
 }
 
-/// b without the valleys of pieces, which have their atoms: weaker features go on attracting.
-fn without_pieces<const D: usize>(
+/// b without the valleys of pieces near the places at which they are met: weaker features go on attracting, and what of
+/// pieces could not be met.
+fn without_met<const D: usize>(
     potential: &ScalarField<D>,
     pieces: &Pieces<D>,
+    met: &[Point<D>],
     distance: &NominalDistance<D>,
 ) -> ScalarField<D> {
     let grid = *potential.grid();
     let mut samples = potential.samples().to_vec();
-    for (point, _) in pieces.points() {
-        let reach = (CLEARED * distance.at(&point.position)).max(CLEARED_STEPS * pieces.step());
+    let near_met = PointGrid::new(&grid.bounds(), distance.least(), met.iter().copied());
+    let is_met = |place: &Point<D>| {
+        let (reach, mut is_met) = (MET * distance.at(place), false);
+        near_met.near(place, reach, |other, _| {
+            is_met |= distance_squared(place, other) <= reach * reach;
+        });
+        is_met
+    };
+    let between = 0.5 * pieces.apart() * pieces.step();
+    for (place, _) in pieces.places().filter(|(place, _)| is_met(place)) {
+        let reach = (CLEARED * distance.at(&place)).max(CLEARED_STEPS * pieces.step()) + between;
         let range = |k: usize| {
-            let low = ((point.position[k] - reach) / grid.step[k]).ceil().max(0.0) as usize;
-            let high = ((point.position[k] + reach) / grid.step[k]).floor().max(0.0) as usize;
+            let low = ((place[k] - reach) / grid.step[k]).ceil().max(0.0) as usize;
+            let high = ((place[k] + reach) / grid.step[k]).floor().max(0.0) as usize;
             low..high.min(grid.shape[k] - 1) + 1
         };
         let ranges: [std::ops::Range<usize>; D] = std::array::from_fn(range);
@@ -130,14 +145,14 @@ fn without_pieces<const D: usize>(
             let (mut rest, mut index, mut stride) = (row, 0, grid.shape[0]);
             let mut beside = 0.0;
             for k in 1..D {
-                let place = ranges[k].start + rest % ranges[k].len();
+                let at = ranges[k].start + rest % ranges[k].len();
                 rest /= ranges[k].len();
-                beside += (place as f64 * grid.step[k] - point.position[k]).powi(2);
-                index += place * stride;
+                beside += (at as f64 * grid.step[k] - place[k]).powi(2);
+                index += at * stride;
                 stride *= grid.shape[k];
             }
             for i in ranges[0].clone() {
-                let along = i as f64 * grid.step[0] - point.position[0];
+                let along = i as f64 * grid.step[0] - place[0];
                 if along * along + beside <= reach * reach {
                     samples[index + i] = 0.0;
                 }

@@ -62,15 +62,19 @@ pub fn strongest<const D: usize>(
     mut points: Vec<FeaturePoint<D>>,
     share: f32,
 ) -> Vec<FeaturePoint<D>> {
+    let least = f64::from(share * strongest_tenth(&points));
+    points.retain(|point| point.strength > least);
+    points
+}
+
+/// The least strength of the strongest tenth of points; 0 of none.
+pub(crate) fn strongest_tenth<const D: usize>(points: &[FeaturePoint<D>]) -> f32 {
     if points.is_empty() {
-        return points;
+        return 0.0;
     }
     let mut strengths: Vec<f32> = points.iter().map(|point| point.strength as f32).collect();
     let place = strengths.len() * 9 / 10;
-    let (_, high, _) = strengths.select_nth_unstable_by(place, f32::total_cmp);
-    let least = f64::from(share * *high);
-    points.retain(|point| point.strength > least);
-    points
+    *strengths.select_nth_unstable_by(place, f32::total_cmp).1
 }
 
 /// A group of linked points.

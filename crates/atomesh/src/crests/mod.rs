@@ -20,6 +20,7 @@ mod valley;
 mod widen;
 
 pub(crate) use bins::Bins;
+pub(crate) use groups::strongest_tenth;
 pub use groups::{Hysteresis, in_large_groups, linked, strongest};
 pub(crate) use pieces::tangents;
 pub use pieces::{Foot, Pieces};

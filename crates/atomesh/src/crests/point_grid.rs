@@ -72,11 +72,6 @@ impl<const D: usize> PointGrid<D> {
         }
     }
 
-    /// The numbers of the points, cube by cube.
-    pub fn order(&self) -> Vec<usize> {
-        self.points.iter().map(|(_, number)| *number as usize).collect()
-    }
-
     fn cube(&self, p: &Point<D>) -> [usize; D] {
         std::array::from_fn(|k| {
             let at = ((p[k] - self.min[k]) / self.width).max(0.0) as usize;

@@ -27,7 +27,7 @@ pub fn repelling_crests<const D: usize>(
         return Ok(Vec::new());
     }
     let grid = potential.grid();
-    let size = distance.least() / grid.step.iter().product::<f64>().powf(1.0 / D as f64);
+    let size = grid.in_samples(distance.least());
     let valleys: Vec<f32> = potential.samples().iter().map(|b| -b.max(0.0)).collect();
     let sigma = [(size / 6.0).max(1.0); D];
     let search = ValleySearch { sigma, least_depth: LEAST_HEIGHT, phase: Phase::Grow };

@@ -36,8 +36,8 @@ pub use options::{EdgeOperator, FeatureOptions, Features};
 pub use thin::{CrestOptions, FaultOptions, HorizonOptions, Polarity};
 
 use crate::crests::FeaturePoint;
-use crate::image::{Image, Samples};
-use crate::watch::{Phase, Watch, check};
+use crate::image::{Grid, Image, Samples};
+use crate::watch::{Cancelled, Phase, Watch, check};
 use rayon::prelude::*;
 use scale::UnitSamples;
 
@@ -134,10 +134,35 @@ pub fn feature_points<const D: usize>(
     }
     let grid = image.frame().grid(options.units);
     let mut points = thin::crest_points(image, options, watch)?;
-    for point in &mut points {
+    to_lattice(&mut points, &grid);
+    Ok(Some(points))
+}
+
+/// Points on the bottoms of the valleys of b, smoothed by a Gaussian of `sigma` least steps, where it is below
+/// −`least_depth`, in lattice coordinates and the order of their samples; their strength is the depth.
+///
+/// # Errors
+/// [`Cancelled`] if `watch` ends the work.
+///
+/// # Panics
+/// If there are not as many values as the grid has samples.
+pub fn valley_points<const D: usize>(
+    potential: &[f32],
+    grid: &Grid<D>,
+    sigma: f64,
+    least_depth: f32,
+    watch: &mut dyn Watch,
+) -> Result<Vec<FeaturePoint<D>>, Cancelled> {
+    let mut points = thin::valleys(potential, grid, sigma, least_depth, watch)?;
+    to_lattice(&mut points, grid);
+    Ok(points)
+}
+
+/// Moves points from samples to the lattice; their normals are there already.
+fn to_lattice<const D: usize>(points: &mut [FeaturePoint<D>], grid: &Grid<D>) {
+    for point in points {
         (0..D).for_each(|k| point.position[k] *= grid.step[k]);
     }
-    Ok(Some(points))
 }
 
 /// Takes samples as a potential as they are, without rescaling.

@@ -112,7 +112,7 @@ impl<const D: usize> Grid<D> {
 
     /// A length in samples, by the geometric mean of the steps where these differ.
     pub fn in_samples(&self, length: f64) -> f64 {
-        length / self.step.iter().product::<f64>().powf(1.0 / D as f64)
+        length / self.step.iter().map(|step| step.powf(1.0 / D as f64)).product::<f64>()
     }
 
     /// The smallest step of all axes.

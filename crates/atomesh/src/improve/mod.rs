@@ -28,10 +28,20 @@ pub enum Align {
     /// Swaps alone; points stay.
     Swaps,
     /// Swaps and moves. Points may also be taken away, and in the plane added.
-    #[default]
     Full,
     /// Atoms stand on features before all others, and facets of features are kept ([`crate::conform`]).
     Conform,
+    /// [`Conform`](Self::Conform) where features are clean lines or sheets, [`Full`](Self::Full) where they are ragged
+    /// or there are none. An [`Improver`], which knows no features, takes it as full.
+    #[default]
+    Auto,
+}
+
+impl Align {
+    /// Whether points are moved.
+    pub(crate) fn moves(self) -> bool {
+        !matches!(self, Self::Off | Self::Swaps)
+    }
 }
 
 /// How a mesh is improved.

@@ -96,8 +96,9 @@ fn improve_around<const D: usize>(
             .collect(),
     };
     let held = facets(&mesh);
+    let fields = run.fields();
     let held = Held { freedom: &freedom, facets: &held };
-    let (mesh, mut first) = improver.improve(mesh, held, run.fields(), options, watch)?;
+    let (mesh, mut first) = improver.improve(mesh, held, fields, options, watch)?;
     if first.floor_held {
         return Ok((mesh, first));
     }
@@ -119,7 +120,7 @@ fn improve_around<const D: usize>(
         })
         .collect();
     let held = Held { freedom: &freedom, facets: &held };
-    let (mesh, second) = improver.improve(mesh, held, run.fields(), options, watch)?;
+    let (mesh, second) = improver.improve(mesh, held, fields, options, watch)?;
     first.rounds += second.rounds;
     first.swaps += second.swaps;
     first.moves += second.moves;

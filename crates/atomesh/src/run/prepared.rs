@@ -3,6 +3,7 @@
 use std::fmt;
 use std::sync::Arc;
 
+use crate::conform::are_on_pieces;
 use crate::crests::Pieces;
 use crate::fields::{Fields, FieldsView, Interpolation, NominalDistance, ScalarField};
 use crate::geometry::{Bounds, Point, compact_order};
@@ -178,6 +179,11 @@ impl<const D: usize> Prepared<D> {
         let mut freedom: Vec<u8> = mesh.points().iter().map(|p| bounds.freedom(p)).collect();
         for &point in outline_facets(&mesh, &bounds).as_flattened() {
             freedom[point as usize] = 0;
+        }
+        if let Some(pieces) = self.pieces() {
+            let are_on = are_on_pieces(mesh.points(), pieces, &bounds);
+            let held = freedom.iter_mut().zip(are_on).filter(|(_, is_on)| *is_on);
+            held.for_each(|(freedom, _)| *freedom = 0);
         }
         let report = OptimizeReport::new(self.0.options.optimize.engine);
         Ok(Connected { run: self.clone(), mesh, freedom, report, mirror_report: None })

@@ -5,7 +5,8 @@ use std::collections::VecDeque;
 use rayon::prelude::*;
 
 use super::super::{FeaturePoint, PointGrid};
-use super::meet::{bridges, fill};
+use super::grow::add_rest;
+use super::meet::join_across;
 use crate::geometry::{Bounds, Point, Sets, difference, dot};
 use crate::image::Grid;
 
@@ -21,6 +22,13 @@ const ALIKE: f64 = 0.93;
 const NEXT: f64 = 2.0;
 /// The greatest share of them.
 const MOST_OTHERS: f64 = 0.12;
+/// How many points are asked for the share of those on clean features.
+const ASKED: usize = 20_000;
+/// Sets of fewer points, in space of fewer than the square, are linked anew with what is left.
+const SMALL: usize = 12;
+/// What goes on across a place where features meet, and what over a gap. Reaches are set where they are used.
+const ACROSS: Alike = Alike { reach: 0.0, cosine: 0.96, slope: 0.08, slack: 0.4 };
+const OVER_GAPS: Alike = Alike { reach: 0.0, cosine: 0.88, slope: 0.22, slack: 0.4 };
 /// The fewest points on a point's plane, itself among them, in the plane; twice as many in space.
 const LEAST_ON: usize = 4;
 
@@ -32,33 +40,75 @@ pub(super) fn linked_pieces<const D: usize>(
     step: f64,
 ) -> (Vec<FeaturePoint<D>>, Sets) {
     let bounds = grid.bounds();
-    let (mut points, meetings) = supported(points, &bounds, step);
+    let reach = LINK * dot(&grid.step, &grid.step).sqrt();
+    let alike = Alike { reach, cosine: 0.8, slope: 0.4, slack: 0.35 };
+    let (mut points, mut others) = supported(points, &bounds, step);
     points.sort_by_key(|point| point.index);
     let mut sets = Sets::new(points.len());
-    let links = links(&points, &bounds, LINK * dot(&grid.step, &grid.step).sqrt(), step);
-    for (i, all) in links.iter().enumerate() {
-        all.iter().for_each(|&j| sets.join(i as u32, j));
+    join(&mut sets, &later_neighbours(&points, &bounds, &alike, step));
+    let meetings: Vec<Point<D>> = others.iter().map(|point| point.position).collect();
+    join_across(&mut points, &mut sets, &meetings, &ACROSS, &bounds, step);
+    others.extend(take_small(&mut points, &mut sets));
+    others.sort_by_key(|point| point.index);
+    add_rest(&mut points, &mut sets, &others, &bounds, reach, step);
+    join_across(&mut points, &mut sets, &[], &OVER_GAPS, &bounds, step);
+    let mut links = later_neighbours(&points, &bounds, &alike, step);
+    for (i, links) in links.iter_mut().enumerate() {
+        links.retain(|&j| sets.root(i as u32) == sets.root(j));
     }
-    let roots = sets.roots();
-    let bridges = bridges(&points, &roots, &meetings, &bounds, step);
-    bridges.iter().for_each(|&[i, j]| sets.join(i, j));
-    turn(&mut points, &links, &bridges);
-    fill(&mut points, &mut sets, &bridges, &bounds, step);
+    turn(&mut points, &links);
     (points, sets)
 }
 
-/// For each point the later ones that it is linked to.
-fn links<const D: usize>(
+/// Takes out the points of sets too small to say how a feature goes on.
+fn take_small<const D: usize>(
+    points: &mut Vec<FeaturePoint<D>>,
+    sets: &mut Sets,
+) -> Vec<FeaturePoint<D>> {
+    let roots = sets.roots();
+    let mut counts = vec![0usize; roots.len()];
+    roots.iter().for_each(|&root| counts[root as usize] += 1);
+    let least = SMALL.pow(D as u32 - 1);
+    let is_small = |i: usize| counts[roots[i] as usize] < least;
+    let (mut kept, mut small) = (Vec::new(), Vec::new());
+    let mut kept_sets = Sets::default();
+    let mut number = vec![u32::MAX; roots.len()];
+    for (i, point) in points.drain(..).enumerate() {
+        if is_small(i) {
+            small.push(point);
+            continue;
+        }
+        let own = kept.len() as u32;
+        kept.push(point);
+        kept_sets.push();
+        let first = &mut number[roots[i] as usize];
+        if *first == u32::MAX {
+            *first = own;
+        }
+        kept_sets.join(*first, own);
+    }
+    (*points, *sets) = (kept, kept_sets);
+    small
+}
+
+/// Makes points that are linked one set.
+fn join(sets: &mut Sets, links: &[Vec<u32>]) {
+    for (i, all) in links.iter().enumerate() {
+        all.iter().for_each(|&j| sets.join(i as u32, j));
+    }
+}
+
+/// For each point the later ones that are on one line or plane with it.
+pub(super) fn later_neighbours<const D: usize>(
     points: &[FeaturePoint<D>],
     bounds: &Bounds<D>,
-    reach: f64,
+    alike: &Alike,
     step: f64,
 ) -> Vec<Vec<u32>> {
     let grid = PointGrid::new(bounds, 1.5 * step, points.iter().map(|point| point.position));
-    let alike = Alike { reach, cosine: 0.8, slope: 0.4, slack: 0.35 };
     let of = |i: usize| {
         let mut found = Vec::new();
-        grid.near(&points[i].position, reach, |_, j| {
+        grid.near(&points[i].position, alike.reach, |_, j| {
             if j > i && alike.holds(&points[i], &points[j], step) {
                 found.push(j as u32);
             }
@@ -68,15 +118,44 @@ fn links<const D: usize>(
     (0..points.len()).into_par_iter().with_min_len(1 << 8).map(of).collect()
 }
 
-/// The points most of whose neighbours lie on their planes, and the places of the others.
+/// The points most of whose neighbours lie on their planes, and the others.
 fn supported<const D: usize>(
     points: Vec<FeaturePoint<D>>,
     bounds: &Bounds<D>,
     step: f64,
-) -> (Vec<FeaturePoint<D>>, Vec<Point<D>>) {
+) -> (Vec<FeaturePoint<D>>, Vec<FeaturePoint<D>>) {
+    let is_kept = are_supported(&points, bounds, step, 1);
+    let (mut kept, mut others) = (Vec::new(), Vec::new());
+    for (point, is_kept) in points.into_iter().zip(is_kept) {
+        if is_kept {
+            kept.push(point);
+        } else {
+            others.push(point);
+        }
+    }
+    (kept, others)
+}
+
+/// The share of points most of whose neighbours lie on their planes; of many points some are asked.
+pub(super) fn clean_share<const D: usize>(points: &[FeaturePoint<D>], grid: &Grid<D>) -> f64 {
+    let step = grid.step.iter().sum::<f64>() / D as f64;
+    let stride = (points.len() / ASKED).max(1);
+    let are_supported = are_supported(points, &grid.bounds(), step, stride);
+    let count = are_supported.iter().filter(|&&is| is).count();
+    count as f64 / are_supported.len().max(1) as f64
+}
+
+/// For every so many points, whether most of its neighbours lie on its plane.
+fn are_supported<const D: usize>(
+    points: &[FeaturePoint<D>],
+    bounds: &Bounds<D>,
+    step: f64,
+    stride: usize,
+) -> Vec<bool> {
     let bins = PointGrid::new(bounds, 1.5 * step, points.iter().map(|point| point.position));
     let reach = SUPPORT * step;
-    let is_supported = |point: &FeaturePoint<D>| {
+    let is_supported = |i: usize| {
+        let point = &points[i * stride];
         let (mut on, mut all, mut others, mut next) = (0usize, 0usize, 0usize, 0usize);
         bins.near(&point.position, reach, |_, j| {
             let offset = difference(&points[j].position, &point.position);
@@ -99,16 +178,8 @@ fn supported<const D: usize>(
             && others as f64 <= MOST_OTHERS * next as f64
             && on as f64 >= LEAST_SUPPORT * all as f64
     };
-    let is_kept: Vec<bool> = points.par_iter().with_min_len(1 << 8).map(is_supported).collect();
-    let (mut kept, mut others) = (Vec::new(), Vec::new());
-    for (point, is_kept) in points.into_iter().zip(is_kept) {
-        if is_kept {
-            kept.push(point);
-        } else {
-            others.push(point.position);
-        }
-    }
-    (kept, others)
+    let count = points.len().div_ceil(stride);
+    (0..count).into_par_iter().with_min_len(1 << 8).map(is_supported).collect()
 }
 
 /// How far two points may be apart and differ and still be of one piece.
@@ -142,13 +213,13 @@ impl Alike {
 }
 
 /// Turns the normals of linked points to the same side, from the first point of each piece on.
-fn turn<const D: usize>(points: &mut [FeaturePoint<D>], links: &[Vec<u32>], bridges: &[[u32; 2]]) {
+fn turn<const D: usize>(points: &mut [FeaturePoint<D>], links: &[Vec<u32>]) {
     let mut around = vec![Vec::new(); points.len()];
-    let links = links.iter().enumerate();
-    let links = links.flat_map(|(i, all)| all.iter().map(move |&j| [i as u32, j]));
-    for [i, j] in links.chain(bridges.iter().copied()) {
-        around[i as usize].push(j);
-        around[j as usize].push(i);
+    for (i, links) in links.iter().enumerate() {
+        for &j in links {
+            around[i].push(j);
+            around[j as usize].push(i as u32);
+        }
     }
     let mut is_turned = vec![false; points.len()];
     let mut next = VecDeque::new();

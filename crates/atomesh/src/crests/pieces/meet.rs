@@ -31,19 +31,34 @@ struct End<const D: usize> {
     reach: f64,
 }
 
+/// Joins pieces that go on in each other, with points between them. `meetings` are places where features meet.
+pub(super) fn join_across<const D: usize>(
+    points: &mut Vec<FeaturePoint<D>>,
+    sets: &mut Sets,
+    meetings: &[Point<D>],
+    alike: &Alike,
+    bounds: &Bounds<D>,
+    step: f64,
+) {
+    let bridges = bridges(points, &sets.roots(), meetings, alike, bounds, step);
+    bridges.iter().for_each(|&[i, j]| sets.join(i, j));
+    fill(points, sets, &bridges, bounds, step);
+}
+
 /// Pairs of points, the first the lower, of pieces that go on in each other: each end of a piece with the nearest end
-/// that is in line with it. `meetings` are places where features meet.
-pub(super) fn bridges<const D: usize>(
+/// that is in line with it.
+fn bridges<const D: usize>(
     points: &[FeaturePoint<D>],
     roots: &[u32],
     meetings: &[Point<D>],
+    alike: &Alike,
     bounds: &Bounds<D>,
     step: f64,
 ) -> Vec<[u32; 2]> {
     let ends = ends(points, roots, meetings, bounds, step);
-    let grid = PointGrid::new(bounds, 3.0 * step, ends.iter().map(|end| end.point.position));
+    let grid = PointGrid::new(bounds, 6.0 * step, ends.iter().map(|end| end.point.position));
     let across = |end: &End<D>| {
-        let alike = Alike { reach: end.reach, cosine: 0.96, slope: 0.08, slack: 0.4 };
+        let alike = Alike { reach: end.reach, ..*alike };
         let mut best = (end.reach * end.reach, None);
         grid.near(&end.point.position, end.reach, |place, j| {
             let found = (distance_squared(place, &end.point.position), Some(ends[j].number));
@@ -71,7 +86,7 @@ fn ends<const D: usize>(
     bounds: &Bounds<D>,
     step: f64,
 ) -> Vec<End<D>> {
-    let meeting_grid = PointGrid::new(bounds, 1.5 * step, meetings.iter().copied());
+    let meeting_grid = PointGrid::new(bounds, 3.0 * step, meetings.iter().copied());
     let grid = PointGrid::new(bounds, 1.5 * step, points.iter().map(|point| point.position));
     let is_at_meeting = |point: &FeaturePoint<D>| {
         let (reach, mut found) = (NEAR_MEETING * step, false);
@@ -91,9 +106,10 @@ fn ends<const D: usize>(
         });
         dot(&sum, &sum).sqrt() > LOPSIDED * step * count
     };
-    let reach = |i: usize| match is_at_meeting(&points[i]) {
-        true => Some((i, BRIDGE * step)),
-        false => is_lopsided(i).then_some((i, GAP * step)),
+    let reach = |i: usize| {
+        let reach = if is_at_meeting(&points[i]) { Some(BRIDGE) } else { None };
+        let reach = reach.or_else(|| is_lopsided(i).then_some(GAP))?;
+        Some((i, reach * step))
     };
     let mut found: Vec<(usize, f64)> =
         (0..points.len()).into_par_iter().with_min_len(1 << 8).filter_map(reach).collect();
@@ -132,7 +148,7 @@ fn evened<const D: usize>(
 }
 
 /// Adds points between joined pieces, in the sets of the pieces.
-pub(super) fn fill<const D: usize>(
+fn fill<const D: usize>(
     points: &mut Vec<FeaturePoint<D>>,
     sets: &mut Sets,
     bridges: &[[u32; 2]],

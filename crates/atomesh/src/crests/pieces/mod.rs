@@ -1,31 +1,36 @@
 //! Pieces of features as geometry: where the nearest place on a piece is, and on which side of it a place lies.
 //!
 //! Points are linked into pieces by place and by normal, so that features that cross stay two: points whose
-//! neighbours do not lie on their own plane, as where features cross, belong to none, and what is straight across
-//! them is joined. The normals of a piece are turned to agree.
+//! neighbours do not lie on their own plane, as where features cross, belong to none at first, and what is straight
+//! across them is joined. What is left, ragged and bent, is linked by growth from its strongest points on. The
+//! normals of a piece are turned to agree.
 //!
-//! Between its points a piece is what a moving least squares fit of second degree says (Alexa and others 2001): it
-//! averages the noise of single points, and follows curvature.
+//! Between its points a piece is what moving least squares fits of second degree say (Alexa and others 2001): they
+//! average the noise of single points, and follow curvature. They are made once, at points some two samples apart
+//! ([`Patch`](patch::Patch)); a place is asked of the nearest.
 
+mod grow;
 mod link;
 mod meet;
+mod patch;
 
 use std::collections::HashSet;
 
+use rayon::prelude::*;
+
 use super::{FeaturePoint, PointGrid};
-use crate::geometry::linear::solve;
 use crate::geometry::{Bounds, Point, Sets, difference, distance_squared, dot};
 use crate::image::Grid;
-use link::linked_pieces;
+use link::{clean_share, linked_pieces};
+use patch::{Cloud, Patch};
 
-/// The deviation of the weights of a fit, and the radius of its points, in mean steps.
-const FIT_WIDTH: f64 = 1.3;
-const FIT_REACH: f64 = 3.25;
-/// A normal that turns less than this, as one minus a cosine, is the same.
-const SAME: f64 = 1e-5;
+/// The width of cubes in which one patch stands for all of a piece, in mean steps, and how far from a patch's middle
+/// its piece still is what it says.
+const PATCH: f64 = 2.0;
+const PATCH_REACH: f64 = 2.6;
 /// The width of cubes in which one point stands for all of a piece, in mean steps.
 const COARSE: f64 = 4.0;
-/// How often a foot is improved.
+/// How often a foot is looked for on the patch nearest to the last.
 const FOOT_ROUNDS: usize = 3;
 /// How far from the nearest point of a piece a place may be along the piece and still be on it, in mean steps: in the
 /// image, and within this of the image's sides, where filters see too little.
@@ -33,6 +38,9 @@ const END: f64 = 1.2;
 const END_AT_SIDE: f64 = 6.0;
 /// How far from its nearest point a piece is looked for, in mean steps.
 const GREATEST_GAP: f64 = 26.0;
+/// A point is at the end or border of its piece if the mean of the points within some steps is farther than this.
+const RIM_REACH: f64 = 3.0;
+const RIM: f64 = 0.4;
 
 /// Pieces of features, in lattice coordinates.
 #[derive(Clone, Debug)]
@@ -43,6 +51,10 @@ pub struct Pieces<const D: usize> {
     /// The mean strength of each piece.
     strengths: Vec<f64>,
     grid: PointGrid<D>,
+    patches: Vec<Patch<D>>,
+    /// The piece of each patch, and whether the patch is at the end or border of its piece.
+    of_patches: Vec<(u32, bool)>,
+    patch_grid: PointGrid<D>,
     /// A point of each piece in each cube of some steps, for asking which pieces are near.
     coarse: PointGrid<D>,
     of_coarse: Vec<u32>,
@@ -82,7 +94,7 @@ impl<const D: usize> Pieces<D> {
     }
 
     fn of_sets(
-        points: Vec<FeaturePoint<D>>,
+        mut points: Vec<FeaturePoint<D>>,
         sets: &mut Sets,
         bounds: &Bounds<D>,
         step: f64,
@@ -105,17 +117,37 @@ impl<const D: usize> Pieces<D> {
         order.iter().zip(0..).for_each(|(&root, n)| number[root as usize] = n);
         let strengths = order.iter().map(|&i| sums[i as usize].1 / sums[i as usize].0 as f64);
         let strengths = strengths.collect();
-        let (points, of_points): (Vec<_>, Vec<_>) = (points.into_iter().zip(&roots))
-            .map(|(point, &root)| (point, number[root as usize]))
-            .filter(|(_, piece)| *piece != u32::MAX)
-            .unzip();
+        let of_all: Vec<u32> = roots.iter().map(|&root| number[root as usize]).collect();
+        let mut pieces = of_all.iter();
+        points.retain(|_| pieces.next() != Some(&u32::MAX));
+        let of_points: Vec<u32> = of_all.into_iter().filter(|&piece| piece != u32::MAX).collect();
         let grid = PointGrid::new(bounds, 1.5 * step, points.iter().map(|point| point.position));
-        let order = grid.order();
-        let points: Vec<FeaturePoint<D>> = order.iter().map(|&i| points[i]).collect();
-        let of_points: Vec<u32> = order.iter().map(|&i| of_points[i]).collect();
-        let grid = PointGrid::new(bounds, 1.5 * step, points.iter().map(|point| point.position));
-        let (coarse, of_coarse) = coarse(&points, &of_points, bounds, step);
-        Self { points, of_points, strengths, grid, coarse, of_coarse, bounds: *bounds, step }
+        let cloud = Cloud { points: &points, pieces: &of_points, grid: &grid, step };
+        let (patches, of_patches) = patches(&cloud);
+        let patch_grid = PointGrid::new(bounds, PATCH * step, patches.iter().map(|p| p.at));
+        let first = firsts(&points, &of_points, COARSE * step);
+        let coarse =
+            PointGrid::new(bounds, COARSE * step, first.iter().map(|&i| points[i].position));
+        let of_coarse = first.iter().map(|&i| of_points[i]).collect();
+        Self {
+            points,
+            of_points,
+            strengths,
+            grid,
+            patches,
+            of_patches,
+            patch_grid,
+            coarse,
+            of_coarse,
+            bounds: *bounds,
+            step,
+        }
+    }
+
+    /// The share of points, in lattice coordinates, that lie on features clean enough to be followed as lines or
+    /// sheets: most points near them lie on their own plane. Of many points some are asked.
+    pub fn clean_share(points: &[FeaturePoint<D>], grid: &Grid<D>) -> f64 {
+        clean_share(points, grid)
     }
 
     /// How many pieces there are.
@@ -143,21 +175,31 @@ impl<const D: usize> Pieces<D> {
         END_AT_SIDE
     }
 
-    /// All points, near ones together, with the piece of each.
+    /// All points, with the piece of each.
     pub fn points(&self) -> impl ExactSizeIterator<Item = (&FeaturePoint<D>, u32)> {
         self.points.iter().zip(self.of_points.iter().copied())
     }
 
-    /// The foot of `p` on the piece nearest to it, if one is within `reach`.
-    pub fn foot(&self, p: &Point<D>, reach: f64) -> Option<Foot<D>> {
-        let nearest = self.nearest(p, reach, |_| true)?;
-        self.foot_from(nearest, p)
+    /// Places on all pieces some two steps apart, with the piece of each.
+    pub(crate) fn places(&self) -> impl ExactSizeIterator<Item = (Point<D>, u32)> {
+        self.patches.iter().zip(&self.of_patches).map(|(patch, (piece, _))| (patch.at, *piece))
     }
 
-    /// The foot of `p` on a piece, if that has a point within `reach`.
+    /// How far apart [`Self::places`] are at most, in mean steps.
+    pub(crate) fn apart(&self) -> f64 {
+        PATCH * (D as f64).sqrt()
+    }
+
+    /// The foot of `p` on the piece nearest to it, if one is within `reach`.
+    pub fn foot(&self, p: &Point<D>, reach: f64) -> Option<Foot<D>> {
+        let nearest = self.nearest_patch(p, reach, |_| true)?;
+        Some(self.foot_from(nearest, p))
+    }
+
+    /// The foot of `p` on a piece, if that has a place within `reach`.
     pub fn foot_on(&self, piece: u32, p: &Point<D>, reach: f64) -> Option<Foot<D>> {
-        let nearest = self.nearest(p, reach, |other| other == piece)?;
-        self.foot_from(nearest, p)
+        let nearest = self.nearest_patch(p, reach, |other| other == piece)?;
+        Some(self.foot_from(nearest, p))
     }
 
     /// All pieces that have a point within `reach` of `p`, and some that are a little farther, in order.
@@ -174,50 +216,53 @@ impl<const D: usize> Pieces<D> {
         found
     }
 
-    fn nearest(&self, p: &Point<D>, reach: f64, wanted: impl Fn(u32) -> bool) -> Option<usize> {
-        // near features the nearest point is within a few steps
-        let mut within = (3.0 * self.step).min(reach);
-        loop {
-            let mut best = (within * within, None);
-            self.grid.near(p, within, |_, i| {
-                let found = (distance_squared(&self.points[i].position, p), Some(i));
-                if wanted(self.of_points[i]) && found <= best {
-                    best = found;
-                }
-            });
-            if best.1.is_some() || within >= reach {
-                return best.1;
-            }
-            within = (1.7 * within).min(reach);
-        }
+    /// The patch of wanted pieces whose middle is nearest, of those that may be within `reach`.
+    fn nearest_patch(
+        &self,
+        p: &Point<D>,
+        reach: f64,
+        wanted: impl Fn(u32) -> bool,
+    ) -> Option<usize> {
+        let wanted = |i: usize| wanted(self.of_patches[i].0);
+        nearest(&self.patch_grid, p, 1.5 * self.step, reach + PATCH * self.step, wanted)
     }
 
-    /// The foot of `p` near a point of a piece.
-    fn foot_from(&self, nearest: usize, p: &Point<D>) -> Option<Foot<D>> {
-        let point = &self.points[nearest];
-        let piece = self.of_points[nearest];
-        let (mut position, mut normal) = (point.position, point.normal);
-        let mut beyond = 0.0;
-        for _ in 0..FOOT_ROUNDS {
-            let height = dot(&difference(p, &position), &normal);
-            let x: Point<D> = std::array::from_fn(|k| p[k] - height * normal[k]);
-            let along = distance_squared(&x, &point.position).sqrt();
-            let gap = self.gap(piece, &x, along);
-            beyond = (gap - self.end_at(&x)).max(0.0);
-            if beyond > 0.0 {
-                // the plane at the end goes on
-                position = x;
+    /// The foot of `p` on a patch, or on those beside it.
+    fn foot_from(&self, mut nearest: usize, p: &Point<D>) -> Foot<D> {
+        let (piece, mut is_rim) = self.of_patches[nearest];
+        let (mut position, mut normal) = self.patches[nearest].foot(p, self.step);
+        let near = (PATCH_REACH * self.step).powi(2);
+        let mut is_far = distance_squared(&position, &self.patches[nearest].at) > near;
+        for _ in 1..FOOT_ROUNDS {
+            if !is_far {
                 break;
             }
-            let before = normal;
-            (position, normal) = self.fit(piece, &x, &normal, gap)?;
-            if dot(&before, &normal) > 1.0 - SAME
-                && distance_squared(&position, &x) < SAME * self.step
-            {
-                break; // on the piece already, and turned as it is
+            let next = self.nearest_patch(&position, 2.0 * PATCH * self.step, |i| i == piece);
+            let Some(next) = next.filter(|&next| next != nearest) else { break };
+            nearest = next;
+            is_rim = self.of_patches[nearest].1;
+            (position, normal) = self.patches[nearest].foot(p, self.step);
+            is_far = distance_squared(&position, &self.patches[nearest].at) > near;
+        }
+        if !is_rim && !is_far {
+            return Foot { position, normal, piece, beyond: 0.0 };
+        }
+        let gap = self.gap(piece, &position);
+        let beyond = (gap - self.end_at(&position)).max(0.0);
+        if beyond == 0.0 && gap > END * self.step {
+            // beyond the last point, near a side of the box: led on by more of the piece
+            let cloud = Cloud {
+                points: &self.points,
+                pieces: &self.of_points,
+                grid: &self.grid,
+                step: self.step,
+            };
+            let normal_there = self.patches[nearest].normal;
+            if let Some(wide) = Patch::fit(&cloud, piece, &position, &normal_there, gap) {
+                (position, normal) = wide.flat_foot(p, self.step);
             }
         }
-        Some(Foot { position, normal, piece, beyond })
+        Foot { position, normal, piece, beyond }
     }
 
     /// How far from its nearest point a piece still is at `x`.
@@ -228,101 +273,72 @@ impl<const D: usize> Pieces<D> {
         self.step * if is_at_side { END_AT_SIDE } else { END }
     }
 
-    /// How far `x` is from the nearest point of a piece; at most `known`.
-    fn gap(&self, piece: u32, x: &Point<D>, known: f64) -> f64 {
-        if known <= END * self.step {
-            return known;
-        }
-        let found = self.nearest(x, known.min(GREATEST_GAP * self.step), |other| other == piece);
-        found.map_or(known, |i| distance_squared(&self.points[i].position, x).sqrt())
+    /// How far `x` is from the nearest point of a piece.
+    fn gap(&self, piece: u32, x: &Point<D>) -> f64 {
+        let most = GREATEST_GAP * self.step;
+        let is_own = |i: usize| self.of_points[i] == piece;
+        let found = nearest(&self.grid, x, END * self.step, most, is_own);
+        found.map_or(most, |i| distance_squared(&self.points[i].position, x).sqrt())
     }
+}
 
-    /// The piece near `x`, whose nearest point is `gap` away: the place straight above or below `x`, and the normal there.
-    fn fit(
-        &self,
-        piece: u32,
-        x: &Point<D>,
-        normal: &Point<D>,
-        gap: f64,
-    ) -> Option<(Point<D>, Point<D>)> {
-        let is_beside = gap > END * self.step; // beyond the last point, near a side of the box
-        let extra = if is_beside { gap } else { 0.0 };
-        let reach = FIT_REACH * self.step + extra;
-        let inverse = 1.0 / (FIT_WIDTH * self.step + extra).powi(2);
-        let axes = tangents(normal);
-        let size = D * (D + 1) / 2;
-        let mut matrix = [[0.0; 6]; 6];
-        let mut right = [[0.0; 1]; 6];
-        let mut count = 0;
-        self.grid.near(x, reach, |_, i| {
-            let point = &self.points[i];
-            if self.of_points[i] != piece || dot(&point.normal, normal) < 0.3 {
-                return;
-            }
-            let offset = difference(&point.position, x);
-            let squared = dot(&offset, &offset);
-            if squared > reach * reach {
-                return;
-            }
-            count += 1;
-            let weight = (-0.5 * squared * inverse).exp();
-            let terms = terms::<D>(&offset, &axes, self.step);
-            let height = dot(&offset, normal);
-            for r in 0..size {
-                for c in 0..size {
-                    matrix[r][c] += weight * terms[r] * terms[c];
-                }
-                right[r][0] += weight * terms[r] * height;
+/// The number of the point nearest to `p` of those wanted within `reach`; the first of equals. Points within `first` are
+/// looked at first.
+fn nearest<const D: usize>(
+    grid: &PointGrid<D>,
+    p: &Point<D>,
+    first: f64,
+    reach: f64,
+    wanted: impl Fn(usize) -> bool,
+) -> Option<usize> {
+    let mut within = first.min(reach);
+    loop {
+        let mut best = (within * within, None);
+        grid.near(p, within, |place, i| {
+            let found = (distance_squared(place, p), Some(i));
+            let is_better = found.0 < best.0
+                || found.0 == best.0 && best.1.is_none_or(|other: usize| i < other);
+            if is_better && wanted(i) {
+                best = found;
             }
         });
-        let size = match count {
-            0 => return None,
-            n if n >= 2 * size && !is_beside => size,
-            n if n > D => D,
-            _ => 1,
-        };
-        let largest = matrix[0][0];
-        (0..size).for_each(|k| matrix[k][k] += 1e-6 * largest);
-        if solve(size, matrix, &mut right) == 0.0 {
-            return None;
+        if best.1.is_some() || within >= reach {
+            return best.1;
         }
-        let place = std::array::from_fn(|k| x[k] + right[0][0] * normal[k]);
-        let mut turned = *normal;
-        if size >= D {
-            for (axis, slope) in axes.iter().take(D - 1).zip(&right[1..]) {
-                (0..D).for_each(|k| turned[k] -= slope[0] / self.step * axis[k]);
-            }
-        }
-        let length = dot(&turned, &turned).sqrt();
-        Some((place, turned.map(|n| n / length)))
+        within = (1.7 * within).min(reach);
     }
 }
 
-/// The first point of each piece in each cube of some steps, and their pieces.
-fn coarse<const D: usize>(
-    points: &[FeaturePoint<D>],
-    of_points: &[u32],
-    bounds: &Bounds<D>,
-    step: f64,
-) -> (PointGrid<D>, Vec<u32>) {
+/// Patches at one point of each piece in each small cube, with their pieces and whether they are at a rim.
+fn patches<const D: usize>(cloud: &Cloud<'_, D>) -> (Vec<Patch<D>>, Vec<(u32, bool)>) {
+    let reach = RIM_REACH * cloud.step;
+    let of = |&i: &usize| {
+        let (point, piece) = (&cloud.points[i], cloud.pieces[i]);
+        let patch = Patch::fit_twice(cloud, piece, &point.position, &point.normal)?;
+        let (mut sum, mut count) = ([0.0; D], 0.0);
+        cloud.grid.near(&patch.at, reach, |place, j| {
+            let offset = difference(place, &patch.at);
+            if cloud.pieces[j] == piece && dot(&offset, &offset) <= reach * reach {
+                (0..D).for_each(|k| sum[k] += offset[k]);
+                count += 1.0;
+            }
+        });
+        let is_rim = dot(&sum, &sum).sqrt() > RIM * cloud.step * count;
+        Some((patch, (piece, is_rim)))
+    };
+    let first = firsts(cloud.points, cloud.pieces, PATCH * cloud.step);
+    let found: Vec<_> = first.par_iter().with_min_len(1 << 7).filter_map(of).collect();
+    found.into_iter().unzip()
+}
+
+/// The first point of each piece in each cube of this width.
+fn firsts<const D: usize>(points: &[FeaturePoint<D>], of_points: &[u32], width: f64) -> Vec<usize> {
     let mut seen = HashSet::new();
     let is_first = |&i: &usize| {
-        let cube = points[i].position.map(|x| (x / (COARSE * step)) as i64);
+        let cube = points[i].position.map(|x| (x / width) as i32);
         seen.insert((cube, of_points[i]))
     };
-    let first: Vec<usize> = (0..points.len()).filter(is_first).collect();
-    let grid = PointGrid::new(bounds, COARSE * step, first.iter().map(|&i| points[i].position));
-    (grid, first.iter().map(|&i| of_points[i]).collect())
-}
-
-/// 1, the coordinates along the axes, and their products, in mean steps.
-fn terms<const D: usize>(offset: &Point<D>, axes: &[Point<D>; 2], step: f64) -> [f64; 6] {
-    let u = dot(offset, &axes[0]) / step;
-    if D == 2 {
-        return [1.0, u, u * u, 0.0, 0.0, 0.0];
-    }
-    let v = dot(offset, &axes[1]) / step;
-    [1.0, u, v, u * u, u * v, v * v]
+    (0..points.len()).filter(is_first).collect()
 }
 
 /// Unit vectors along a line or plane; in the plane only the first counts.

@@ -32,6 +32,7 @@ use horizons::Horizons;
 use options::Thresholds;
 use rayon::prelude::*;
 use ridges::Ridges;
+pub(super) use ridges::valleys;
 
 /// The width of the valleys made of thinned features, in least steps an axis: 1 in the plane, 1.5 in space. Edges of
 /// a brain (d = 6) were followed to 0.64 with 1 and 0.66 with 1.5; with 2 cells were bad.

@@ -90,14 +90,14 @@ struct Rounds<'a> {
 }
 
 impl Rounds<'_> {
-    /// Swaps, and with [`Align::Full`] moves, takes away and adds points, until nothing helps. Reports how often.
+    /// Swaps, and, but with [`Align::Swaps`], moves, takes away and adds points, until nothing helps. Reports how often.
     fn run(
         &mut self,
         triangles: &mut Triangles,
         watch: &mut dyn Watch,
     ) -> Result<ImproveReport, Cancelled> {
         let Self { energy, mover, distance, align } = self;
-        let is_full = matches!(align, Align::Full | Align::Conform);
+        let is_full = align.moves();
         let mut report = ImproveReport::default();
         for round in 0..ROUNDS {
             check(watch, Phase::Improve, round as f64 / ROUNDS as f64, None)?;

@@ -82,7 +82,7 @@ impl Improver<3> for SpaceImprover {
             align: options.align,
             cosine_limit: (options.min_angle + MARGIN).to_radians().cos(),
         };
-        let moves = matches!(options.align, Align::Full | Align::Conform);
+        let moves = options.align.moves();
         let freedom = if moves { held.freedom } else { &vec![0; points.len()] };
         let mut whole = WholeMesh::new(points, freedom, &corners, &bounds, held.facets);
         let mut report =
@@ -151,11 +151,11 @@ impl Work<'_> {
             pending.map(|(&is_pending, p)| is_pending && is_weighted(p)).collect();
         let mut aligner = Aligner::new(field, self.cosine_limit, tetrahedra);
         aligner.swap(tetrahedra, &active, &mut effort);
-        if self.align == Align::Full {
+        if self.align.moves() {
             aligner.moves(tetrahedra, &active, &mut effort);
         }
         remove_slivers(tetrahedra, self.cosine_limit, ROUNDS, &mut effort);
-        if self.align == Align::Full {
+        if self.align.moves() {
             aligner.bring_strays(tetrahedra, &active, self.fields.distance, &mut effort);
         }
         effort

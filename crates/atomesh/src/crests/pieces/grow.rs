@@ -1,0 +1,125 @@
+//! Pieces of what is left: ragged, bent, or close to others.
+
+use std::collections::VecDeque;
+
+use rayon::prelude::*;
+
+use super::super::{Bins, FeaturePoint, PointGrid};
+use super::link::{Alike, later_neighbours};
+use crate::geometry::{Bounds, Sets, difference, distance_squared, dot};
+
+/// Points this near to a piece's are explained by it, in mean steps; and those in the flank of its valley, where noise
+/// makes valleys of its own: as near as this, and weaker by this.
+const EXPLAINED: f64 = 1.6;
+const FLANK: f64 = 3.5;
+const WEAKER: f64 = 0.6;
+/// A piece is one layer: within this, in mean steps, no point of it stands beside another, above its plane by more than
+/// a share of their distance and a part of a step; nearer than the last they are one.
+const LAYER: f64 = 3.2;
+const ABOVE: (f64, f64) = (0.5, 0.35);
+const SAME: f64 = 0.8;
+
+/// Adds the points that no piece explains, linked by growth from the strongest on: each next point is on the plane of
+/// one that is there, and beside none. So where a line branches one branch goes on, and the other is a piece of its own.
+pub(super) fn add_rest<const D: usize>(
+    points: &mut Vec<FeaturePoint<D>>,
+    sets: &mut Sets,
+    rest: &[FeaturePoint<D>],
+    bounds: &Bounds<D>,
+    reach: f64,
+    step: f64,
+) {
+    let rest = unexplained(points, rest, bounds, step);
+    let alike = Alike { reach, cosine: 0.8, slope: 0.4, slack: 0.35 };
+    let mut around = vec![Vec::new(); rest.len()];
+    for (i, later) in later_neighbours(&rest, bounds, &alike, step).into_iter().enumerate() {
+        for j in later {
+            around[i].push(j);
+            around[j as usize].push(i as u32);
+        }
+    }
+    let mut seeds: Vec<u32> = (0..rest.len() as u32).collect();
+    seeds.sort_by(|&a, &b| {
+        let of = |i: u32| rest[i as usize].strength;
+        of(b).total_cmp(&of(a)).then(a.cmp(&b))
+    });
+    let positions = rest.iter().map(|point| point.position);
+    let all = Bins::of(bounds, step, positions);
+    let mut piece = vec![u32::MAX; rest.len()];
+    let mut next = VecDeque::new();
+    for (number, seed) in (0..).zip(seeds) {
+        if piece[seed as usize] != u32::MAX {
+            continue;
+        }
+        piece[seed as usize] = number;
+        next.push_back(seed);
+        while let Some(i) = next.pop_front() {
+            for &j in &around[i as usize] {
+                if piece[j as usize] == u32::MAX
+                    && !is_beside(&rest, j as usize, number, &piece, &all, step)
+                {
+                    piece[j as usize] = number;
+                    next.push_back(j);
+                }
+            }
+        }
+    }
+    let mut first = vec![u32::MAX; rest.len()];
+    for (point, &number) in rest.iter().zip(&piece) {
+        let own = points.len() as u32;
+        sets.push();
+        points.push(*point);
+        let first = &mut first[number as usize];
+        if *first == u32::MAX {
+            *first = own;
+        }
+        sets.join(*first, own);
+    }
+}
+
+/// The points that none of `points` explains.
+fn unexplained<const D: usize>(
+    points: &[FeaturePoint<D>],
+    rest: &[FeaturePoint<D>],
+    bounds: &Bounds<D>,
+    step: f64,
+) -> Vec<FeaturePoint<D>> {
+    let grid = PointGrid::new(bounds, 2.0 * step, points.iter().map(|point| point.position));
+    let (near, flank) = (EXPLAINED * step, FLANK * step);
+    let is_free = |point: &FeaturePoint<D>| {
+        let mut is_free = true;
+        grid.near(&point.position, flank, |place, i| {
+            let squared = distance_squared(place, &point.position);
+            let is_weaker = point.strength < WEAKER * points[i].strength;
+            is_free &= squared >= near * near && (squared >= flank * flank || !is_weaker);
+        });
+        is_free
+    };
+    let is_free: Vec<bool> = rest.par_iter().with_min_len(1 << 8).map(is_free).collect();
+    let free = rest.iter().zip(is_free).filter(|(_, is_free)| *is_free);
+    free.map(|(point, _)| *point).collect()
+}
+
+/// Whether a point would stand beside others of a piece, as in a second layer.
+fn is_beside<const D: usize>(
+    rest: &[FeaturePoint<D>],
+    j: usize,
+    number: u32,
+    piece: &[u32],
+    all: &Bins<D>,
+    step: f64,
+) -> bool {
+    let (point, reach) = (&rest[j], LAYER * step);
+    let mut is_beside = false;
+    all.near(&point.position, reach, |k| {
+        if piece[k] != number {
+            return;
+        }
+        let offset = difference(&rest[k].position, &point.position);
+        let length = dot(&offset, &offset).sqrt();
+        let above = dot(&offset, &point.normal).abs();
+        is_beside |=
+            (SAME * step..=reach).contains(&length) && above > ABOVE.0 * length + ABOVE.1 * step;
+    });
+    is_beside
+}
