@@ -15,7 +15,7 @@ use super::problem::place;
 use crate::error::JobError;
 use crate::files::has_extension;
 use crate::images::is_z_up;
-use crate::mesh::refusal;
+use crate::mesh::meshed;
 use crate::mesh_file;
 use crate::options::RunConfig;
 use crate::session::Session;
@@ -148,7 +148,7 @@ impl<const D: usize> FlowMesh<D> {
         session: &mut Session<'_>,
     ) -> Result<Self, JobError> {
         check_wells(run, flow, &prepared)?;
-        let outcome = prepared.run(session).map_err(|e| refusal(run, e))?;
+        let outcome = meshed(run, prepared, session)?;
         let cells = match outcome.world_cells() {
             Some(cells) => {
                 let features = outcome.cell_features_from(-flow.below).unwrap_or_default();

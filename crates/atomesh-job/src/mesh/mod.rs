@@ -69,7 +69,21 @@ pub fn mesh<const D: usize>(
 ) -> Result<Outcome<D>, JobError> {
     let (prepared, image) = prepare(run, images, dimension, session)?;
     drop(image);
-    prepared.run(session).map_err(|e| refusal(run, e))
+    meshed(run, prepared, session)
+}
+
+/// Meshes what is prepared, and says what of it is odd.
+pub(crate) fn meshed<const D: usize>(
+    run: &RunConfig,
+    prepared: Prepared<D>,
+    session: &mut Session<'_>,
+) -> Result<Outcome<D>, JobError> {
+    let said = prepared.warnings().len();
+    let outcome = prepared.run(session).map_err(|e| refusal(run, e))?;
+    for warning in &outcome.warnings()[said..] {
+        session.warn(run.input.shown(), warning);
+    }
+    Ok(outcome)
 }
 
 /// What became of a run from file to file.
@@ -181,7 +195,7 @@ impl FileRun<'_> {
         let images = MeshImages::read_fields(run, image, dimension, session)?;
         let (prepared, image) = prepare(run, images, dimension, session)?;
         let image = outputs.needs_image().then_some(image);
-        let outcome = prepared.run(session).map_err(|e| refusal(run, e))?;
+        let outcome = meshed(run, prepared, session)?;
         let measured = match &image {
             Some(image) if outputs.needs_report() => Measured::All(image),
             _ if self.options.measures_shape => Measured::Shape,

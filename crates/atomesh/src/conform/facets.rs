@@ -12,7 +12,7 @@ use crate::geometry::{Bounds, Point};
 use crate::mesh::Mesh;
 
 /// A point within this of a piece is on it, in mean steps: within the box, and on its sides, where pieces are led on.
-const ON: f64 = 0.1;
+const ON: f64 = 0.25;
 const ON_AT_SIDE: f64 = 0.35;
 /// The same for other pieces than the nearest: where they cross, a place on both is known less well.
 const ON_AT_CROSSING: f64 = 0.5;

@@ -18,6 +18,7 @@ mod curves;
 mod facets;
 mod recover;
 mod trace;
+mod unmet;
 
 use rayon::prelude::*;
 
@@ -33,6 +34,7 @@ use atoms::{FeatureAtom, feature_atoms};
 pub(crate) use facets::are_on_pieces;
 pub use facets::{FeatureFacet, feature_facets};
 use recover::{Heights, brought_near, crossings, recovered};
+pub use unmet::{Unmet, unmet};
 
 /// The least distance of other atoms from those on features, over d: before they settle, and after.
 const CLEAR: [f64; 2] = [0.7, 0.55];

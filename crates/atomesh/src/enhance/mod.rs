@@ -112,7 +112,7 @@ fn denoised<const D: usize>(
 }
 
 /// Points on the features of an image, in lattice coordinates: crests between samples, whatever the potential is made
-/// by. `None` for features that are the valleys of the potential itself (dark, bright, labels).
+/// by, and places between labels. `None` for features that are the valleys of the potential itself (dark, bright).
 ///
 /// # Errors
 /// As [`enhance()`].
@@ -123,7 +123,11 @@ pub fn feature_points<const D: usize>(
 ) -> Result<Option<Vec<FeaturePoint<D>>>, EnhanceError> {
     let is_crest = matches!(
         options.features,
-        Features::Edges | Features::Ridges | Features::Faults | Features::Horizons
+        Features::Edges
+            | Features::Ridges
+            | Features::Faults
+            | Features::Horizons
+            | Features::Labels
     );
     if !is_crest {
         return Ok(None);
@@ -133,7 +137,10 @@ pub fn feature_points<const D: usize>(
         return feature_points(&image, &FeatureOptions { denoise: None, ..*options }, watch);
     }
     let grid = image.frame().grid(options.units);
-    let mut points = thin::crest_points(image, options, watch)?;
+    let mut points = match options.features {
+        Features::Labels => labels::interface_points(image, options, watch)?,
+        _ => thin::crest_points(image, options, watch)?,
+    };
     to_lattice(&mut points, &grid);
     Ok(Some(points))
 }

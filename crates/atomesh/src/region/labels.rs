@@ -72,7 +72,7 @@ pub fn join_islands<const D: usize>(mesh: &Mesh<D>, labels: &mut [i32], least: u
 pub struct Interface<const D: usize> {
     /// The labels, the lower first.
     pub labels: [i32; 2],
-    /// The facets, corners ascending, in lexicographic order.
+    /// The facets, their normals from the lower label to the higher, in the order of their ascending corners.
     pub facets: Vec<[u32; D]>,
 }
 
@@ -85,10 +85,18 @@ pub fn interfaces<const D: usize>(mesh: &Mesh<D>, labels: &[i32]) -> Vec<Interfa
     let mut found: Vec<([i32; 2], [u32; D])> = (mesh.facets().iter())
         .filter_map(|facet| {
             let (a, b) = (labels[facet.cell as usize], labels[facet.neighbour? as usize]);
-            (a != b).then(|| ([a.min(b), a.max(b)], facet.corners))
+            if a == b {
+                return None;
+            }
+            let mut at = (0..=D).map(|opposite| mesh.facet_of(facet.cell as usize, opposite));
+            let mut outward = at.find(|found| is_facet(found, &facet.corners))?;
+            if a > b {
+                outward.swap(D - 2, D - 1);
+            }
+            Some(([a.min(b), a.max(b)], outward))
         })
         .collect();
-    found.sort_unstable();
+    found.sort_by_key(|(labels, facet)| (*labels, ascending(facet)));
     found
         .chunk_by(|a, b| a.0 == b.0)
         .map(|group| Interface {
@@ -96,6 +104,17 @@ pub fn interfaces<const D: usize>(mesh: &Mesh<D>, labels: &[i32]) -> Vec<Interfa
             facets: group.iter().map(|(_, facet)| *facet).collect(),
         })
         .collect()
+}
+
+fn ascending<const D: usize>(facet: &[u32; D]) -> [u32; D] {
+    let mut sorted = *facet;
+    sorted.sort_unstable();
+    sorted
+}
+
+/// Whether the corners of a facet are these, which ascend.
+fn is_facet<const D: usize>(facet: &[u32; D], corners: &[u32; D]) -> bool {
+    ascending(facet) == *corners
 }
 
 #[cfg(test)]
@@ -128,8 +147,10 @@ mod tests {
         let found = interfaces(&mesh, &labels);
         assert_eq!(found.len(), 1);
         assert_eq!(found[0].labels, [-2, 7]);
-        let diagonals = found[0].facets.iter().filter(|[a, b]| b - a == 10).count();
+        let diagonals = found[0].facets.iter().filter(|[a, b]| a.abs_diff(*b) == 10).count();
         assert_eq!((found[0].facets.len(), diagonals), (7, 4));
+        // label −2 is on the right
+        assert!(found[0].facets.iter().all(|facet| mesh.facet_normal(facet)[0] < 0.0));
         labels.fill(3);
         assert_eq!(interfaces(&mesh, &labels), []);
     }

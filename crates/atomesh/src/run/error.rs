@@ -174,6 +174,14 @@ pub enum Warning {
         /// What stands in the way.
         why: &'static str,
     },
+    /// Some of the features are not met by facets of their own.
+    #[error("{:.0} % of the features are not met, where they cross, end, or are nearer to each other than about two thirds of an edge, first near {place}: shorter edges meet more", 100.0 * share)]
+    NotMet {
+        /// The share of all features' length, in space of their area.
+        share: f64,
+        /// A place on the strongest of them, in world coordinates.
+        place: String,
+    },
     /// d is larger than the box.
     #[error("the nominal distance {distance} exceeds the box, {extent} along {}: the mesh is as coarse as can be", ["x", "y", "z"][*axis])]
     Coarse {

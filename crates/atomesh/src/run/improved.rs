@@ -2,6 +2,7 @@
 
 use rayon::prelude::*;
 
+use crate::conform::{FeatureFacet, Unmet, feature_facets, unmet};
 use crate::image::Samples;
 use crate::improve::ImproveReport;
 use crate::mesh::Mesh;
@@ -11,9 +12,12 @@ use crate::region::{join_islands, outline_facets};
 use crate::sample::{SampleOptions, Statistic, sample_in_frame};
 use crate::watch::Watch;
 
-use super::error::RunError;
+use super::error::{RunError, Warning};
 use super::outcome::Outcome;
 use super::prepared::{Parts, Prepared};
+
+/// The least share of features not met that is said.
+const LEAST_UNMET: f64 = 0.03;
 
 /// The mesh as it stays: facets on features, no cell flat.
 #[derive(Clone, Debug)]
@@ -69,6 +73,8 @@ pub(super) fn finish<const D: usize>(
     let (low, high) = potential.range(); // a spline passes beyond it at jumps
     let at = |p| (potential.value(p) as f32).clamp(low, high);
     let potential_at_points = points.map(at).collect();
+    let (feature_facets, not_met) = met_features(&run, &mesh);
+    let warnings = run.warnings().iter().cloned().chain(not_met).collect();
     Ok(Outcome {
         run,
         mesh,
@@ -79,8 +85,27 @@ pub(super) fn finish<const D: usize>(
         improve_report,
         mirror_report,
         outline_facets,
+        feature_facets,
+        warnings,
         labels,
     })
+}
+
+/// The facets of the features that the mesh was made to keep to, and a warning if much of these is not met.
+fn met_features<const D: usize>(
+    run: &Prepared<D>,
+    mesh: &Mesh<D>,
+) -> (Vec<FeatureFacet<D>>, Option<Warning>) {
+    let Some(pieces) = run.pieces() else { return (Vec::new(), None) };
+    let facets = feature_facets(mesh, pieces, run.distance());
+    let Unmet { share, places } = unmet(mesh, &facets, pieces, run.distance());
+    let warning = places.first().filter(|_| share >= LEAST_UNMET).map(|place| {
+        let (frame, units) = (&run.parts().frame, run.options().units);
+        let place = frame.lattice_to_world(units, place).map(|x| format!("{x:.6}"));
+        let place = place.map(|x| x.trim_end_matches('0').trim_end_matches('.').to_string());
+        Warning::NotMet { share, place: place.join(",") }
+    });
+    (facets, warning)
 }
 
 /// The label of each cell.

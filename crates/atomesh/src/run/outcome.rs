@@ -2,7 +2,7 @@
 
 use rayon::prelude::*;
 
-use crate::conform::feature_facets;
+use crate::conform::FeatureFacet;
 use crate::features::{
     FacetField, FacetsOfFeature, FeatureFaces, FeatureFacetOptions, FeatureSet, feature_faces,
     find_features,
@@ -37,6 +37,9 @@ pub struct Outcome<const D: usize> {
     pub(super) improve_report: Option<ImproveReport>,
     pub(super) mirror_report: Option<MirrorReport>,
     pub(super) outline_facets: Vec<[u32; D]>,
+    /// The facets of the features that the mesh was made to keep to.
+    pub(super) feature_facets: Vec<FeatureFacet<D>>,
+    pub(super) warnings: Vec<Warning>,
     pub(super) labels: Option<Vec<i32>>,
 }
 
@@ -207,9 +210,9 @@ impl<const D: usize> Outcome<D> {
         self.outline().is_none().then(|| self.run.bounds())
     }
 
-    /// What was odd.
+    /// What was odd: what the run was prepared with, then what became of it.
     pub fn warnings(&self) -> &[Warning] {
-        self.run.warnings()
+        &self.warnings
     }
 
     /// Measures shape and alignment.
@@ -258,7 +261,7 @@ fn own_features<const D: usize>(outcome: &Outcome<D>, mesh: &Mesh<D>) -> Option<
     let mut groups: Vec<FacetsOfFeature<D>> = (0..pieces.len())
         .map(|piece| FacetsOfFeature { facets: Vec::new(), mean: mean(piece) })
         .collect();
-    for facet in feature_facets(&outcome.mesh, pieces, outcome.distance()) {
+    for facet in &outcome.feature_facets {
         groups[facet.piece as usize].facets.push(facet.corners);
     }
     Some(FeatureSet::of_groups(mesh, &groups))

@@ -167,7 +167,7 @@ fn find_pieces<const D: usize>(
     let mut is_valley = inputs.is_potential;
     for kind in kinds {
         let kind = FeatureOptions { units: options.units, ..kind };
-        match enhance::feature_points(inputs.image, &kind, watch)? {
+        match enhance::feature_points(image_of(inputs, kind.features), &kind, watch)? {
             Some(found) => points.extend(found),
             None => is_valley |= kind.features != Features::None,
         }
@@ -215,10 +215,7 @@ fn potential_samples<const D: usize>(
     }
     let smooth = options.features.smooth.or_else(|| width_for_faces(inputs, options));
     let features = FeatureOptions { units: options.units, smooth, ..options.features };
-    let image_of = |kind| match (inputs.labels, kind) {
-        (Some(labels), Features::Labels) => labels,
-        _ => inputs.image,
-    };
+    let image_of = |kind| image_of(inputs, kind);
     let enhanced = match &options.mixture {
         Some(mixture) => enhance::enhance_mixture(mixture, &features, image_of, watch)?,
         None => enhance::enhance(image_of(features.features), &features, watch)?,
@@ -247,6 +244,14 @@ fn width_for_faces<const D: usize>(
         Size::Wavelength { .. } => return None,
     };
     Some((0.25 * distance).max(grid.least_step()))
+}
+
+/// The image that features of a kind are looked for in.
+fn image_of<'a, const D: usize>(inputs: &Inputs<'a, D>, kind: Features) -> &'a Image<D> {
+    match (inputs.labels, kind) {
+        (Some(labels), Features::Labels) => labels,
+        _ => inputs.image,
+    }
 }
 
 fn nominal_distance<const D: usize>(
