@@ -20,6 +20,8 @@ mod recover;
 mod trace;
 mod unmet;
 
+use std::collections::HashSet;
+
 use rayon::prelude::*;
 
 use crate::crests::{Bins, Pieces, PointGrid};
@@ -100,10 +102,11 @@ pub fn conform<const D: usize>(
     let (bounds, distance) = (*lattice.bounds(), fields.distance);
     let atoms = feature_atoms(pieces, &bounds, distance, watch)?;
     let mut lattice = without_near(lattice, &atoms, distance, 0);
-    for FeatureAtom { position, .. } in &atoms {
-        if !lattice.atoms().contains(position) {
-            lattice.push(*position, bounds.freedom(position), 0.0);
-        }
+    let bits = |p: &Point<D>| p.map(f64::to_bits);
+    let there: HashSet<[u64; D]> = lattice.atoms().iter().map(bits).collect();
+    for FeatureAtom { position, .. } in atoms.iter().filter(|a| !there.contains(&bits(&a.position)))
+    {
+        lattice.push(*position, bounds.freedom(position), 0.0);
     }
     let lattice = fill_holes(scatterer, lattice, distance, FILL_ROUNDS, watch)?;
     let lattice = without_near(lattice.along_curve(), &atoms, distance, 1);

@@ -66,6 +66,8 @@ struct Small {
     rim: Vec<u64>,
     mean: f64,
     facets: Vec<u32>,
+    /// Whether it joins others: it has no free end (2-D) or side (3-D).
+    joins: bool,
 }
 
 /// The facets, by place, that one round drops.
@@ -84,7 +86,8 @@ fn next_to_drop<const D: usize>(
         });
         let (measure, mean) = measure_and_mean(mesh, values);
         if facets.len() < options.min_facets || measure < options.min_measure {
-            small.push(Small { rim: rim(&ridges, &facets), mean, facets });
+            let joins = has_no_free_side(&ridges, &facets);
+            small.push(Small { rim: rim(&ridges, &facets), mean, facets, joins });
         }
     }
     // the deepest first, and of equal ones that with the lowest facets
@@ -98,6 +101,7 @@ fn next_to_drop<const D: usize>(
     if !dropped.is_empty() {
         return dropped;
     }
+    small.retain(|piece| !piece.joins);
     let fewest = small.iter().map(|piece| piece.facets.len()).min().unwrap_or(0);
     small.retain(|piece| piece.facets.len() == fewest);
     small.sort_by(|a, b| b.mean.total_cmp(&a.mean).then(a.facets.cmp(&b.facets)));
@@ -110,6 +114,11 @@ fn next_to_drop<const D: usize>(
         }
     }
     dropped
+}
+
+/// Whether another facet meets each side of a piece.
+fn has_no_free_side<const D: usize>(ridges: &Ridges<D>, piece: &[u32]) -> bool {
+    piece.iter().all(|&at| (0..D).all(|opposite| ridges.count(at, opposite) > 1))
 }
 
 /// The ridges where a piece meets others, ascending.

@@ -3,8 +3,9 @@
 use rayon::prelude::*;
 
 use super::{FacetTest, FeaturesError};
+use crate::crests::{FeaturePoint, PointGrid};
 use crate::fields::ScalarField;
-use crate::geometry::{Point, distance_squared};
+use crate::geometry::{Bounds, Point, difference, distance_squared, dot};
 use crate::mesh::{Facet, Mesh};
 use crate::watch::{Phase, Watch, check};
 
@@ -13,6 +14,15 @@ const BLOCK: usize = 1 << 16;
 
 /// Most parts into which an edge of a facet is divided.
 const MOST_PARTS: f64 = 64.0;
+
+/// A facet lies on a crest whose normal is within this of its own, 30°, as cosine.
+const ALONG: f64 = 0.866;
+
+/// No crest within so many reaches of a facet's middle: the facet lies on none.
+const NEAR: f64 = 1.8;
+
+/// How far along a feature one of its points stands for it, in steps: half the diagonal of a sample's cell in space.
+const STANDS_FOR: f64 = 0.87;
 
 /// The facets between two cells of a mesh, each with the mean and the greatest b along it.
 ///
@@ -38,16 +48,27 @@ impl<const D: usize> FacetField<D> {
         potential: &ScalarField<D>,
         watch: &mut dyn Watch,
     ) -> Result<Self, FeaturesError> {
-        let facets = inner_facets(mesh);
         let step = potential.grid().least_step();
         let longest = if D == 2 { 0.5 * step } else { step };
+        Self::read(mesh, watch, |corners, _| {
+            mean_and_greatest(corners, longest, |p| potential.value(p))
+        })
+    }
+
+    /// What `of` reads along each facet, given its corners and normal: the mean and the greatest value.
+    fn read(
+        mesh: &Mesh<D>,
+        watch: &mut dyn Watch,
+        of: impl Fn(&[Point<D>; D], &Point<D>) -> (f64, f64) + Sync,
+    ) -> Result<Self, FeaturesError> {
+        let facets = inner_facets(mesh);
         let mut values = Vec::with_capacity(facets.len());
         let blocks = facets.len().div_ceil(BLOCK).max(1);
         for (done, block) in facets.chunks(BLOCK).enumerate() {
             check(watch, Phase::Measure, done as f64 / blocks as f64, None)?;
             let along = block.par_iter().with_min_len(1 << 8).map(|facet| {
                 let corners = facet.corners.map(|corner| mesh.points()[corner as usize]);
-                mean_and_greatest(&corners, longest, |p| potential.value(p))
+                of(&corners, &mesh.facet_normal(&facet.corners))
             });
             values.par_extend(along);
         }
@@ -71,6 +92,28 @@ impl<const D: usize> FacetField<D> {
         let greatest =
             facets.iter().map(|facet| of(facet).into_iter().fold(-1.0, f64::max)).collect();
         Ok(Self { facets, mean, greatest })
+    }
+
+    /// How much of each facet lies on crests of an image, given by points about a step apart: in place of the greatest b
+    /// there is −1 times the share of the facet that is within `reach` of a crest and turned as it is, within 30°; in
+    /// place of the mean of b, that times the mean strength of the crests there.
+    ///
+    /// All in the mesh's coordinates; `step` is the mean step of samples there.
+    ///
+    /// # Errors
+    /// [`FeaturesError::Cancelled`] if the watch ends the work.
+    pub fn on_crests(
+        mesh: &Mesh<D>,
+        crests: &[FeaturePoint<D>],
+        step: f64,
+        reach: f64,
+        watch: &mut dyn Watch,
+    ) -> Result<Self, FeaturesError> {
+        let bounds = Bounds::of(mesh.points()).unwrap_or(Bounds { min: [0.0; D], max: [0.0; D] });
+        let positions = crests.iter().map(|point| point.position);
+        let near = Crests { crests, grid: PointGrid::new(&bounds, reach, positions), step, reach };
+        let longest = if D == 2 { 0.5 * step } else { 1.5 * step };
+        Self::read(mesh, watch, |corners, normal| near.along(corners, normal, longest))
     }
 
     /// Facets with given means, which are the greatest values too.
@@ -104,6 +147,66 @@ impl<const D: usize> FacetField<D> {
     }
 }
 
+/// Crests near facets.
+struct Crests<'a, const D: usize> {
+    crests: &'a [FeaturePoint<D>],
+    grid: PointGrid<D>,
+    step: f64,
+    reach: f64,
+}
+
+impl<const D: usize> Crests<'_, D> {
+    /// The strength and the share of crests along a facet, below 0.
+    fn along(&self, corners: &[Point<D>; D], normal: &Point<D>, longest: f64) -> (f64, f64) {
+        let length = dot(normal, normal).sqrt();
+        if length == 0.0 {
+            return (0.0, 0.0);
+        }
+        let normal = normal.map(|n| n / length);
+        // most facets are far from all crests
+        let middle = std::array::from_fn(|k| corners.iter().map(|c| c[k]).sum::<f64>() / D as f64);
+        if !self.is_near(&middle) {
+            return (0.0, 0.0);
+        }
+        let (mut count, mut on, mut strength) = (0.0, 0.0, 0.0);
+        each_middle(parts(corners, longest), |weights: [f64; D]| {
+            let at = std::array::from_fn(|k| (0..D).map(|i| weights[i] * corners[i][k]).sum());
+            let found = self.strongest(&at, &normal);
+            count += 1.0;
+            on += f64::from(u8::from(found > 0.0));
+            strength += found;
+        });
+        (-strength / count, -on / count)
+    }
+
+    /// Whether a crest is near a place, if not so near that a facet there lies on it.
+    fn is_near(&self, place: &Point<D>) -> bool {
+        let (mut is_near, reach) = (false, NEAR * self.reach + STANDS_FOR * self.step);
+        self.grid.near(place, reach, |crest, _| {
+            is_near |= distance_squared(crest, place) <= reach * reach;
+        });
+        is_near
+    }
+
+    /// The strength of the strongest crest at a place, turned as a facet with that normal; 0 if there is none.
+    fn strongest(&self, at: &Point<D>, normal: &Point<D>) -> f64 {
+        let mut strongest = 0.0f64;
+        self.grid.near(at, self.reach + STANDS_FOR * self.step, |place, i| {
+            let crest = &self.crests[i];
+            let offset = difference(place, at);
+            let above = dot(&offset, &crest.normal);
+            let beside = (dot(&offset, &offset) - above * above).max(0.0).sqrt();
+            let beside = (beside - STANDS_FOR * self.step).max(0.0);
+            if above * above + beside * beside <= self.reach * self.reach
+                && dot(&crest.normal, normal).abs() >= ALONG
+            {
+                strongest = strongest.max(crest.strength);
+            }
+        });
+        strongest
+    }
+}
+
 fn inner_facets<const D: usize>(mesh: &Mesh<D>) -> Vec<Facet<D>> {
     let mut facets = mesh.facets();
     facets.retain(|facet| facet.neighbour.is_some());
@@ -117,9 +220,7 @@ fn mean_and_greatest<const D: usize>(
     longest: f64,
     b: impl Fn(&Point<D>) -> f64,
 ) -> (f64, f64) {
-    let pairs = (0..D).flat_map(|i| (0..i).map(move |j| (i, j)));
-    let side = pairs.map(|(i, j)| distance_squared(&corners[i], &corners[j])).fold(0.0, f64::max);
-    let parts = (side.sqrt() / longest).ceil().clamp(1.0, MOST_PARTS) as usize;
+    let parts = parts(corners, longest);
     let greatest_at_corners = corners.iter().map(&b).fold(-1.0, f64::max);
     let (mut sum, mut count, mut greatest) = (0.0, 0.0, greatest_at_corners);
     each_middle(parts, |weights: [f64; D]| {
@@ -130,6 +231,13 @@ fn mean_and_greatest<const D: usize>(
         greatest = greatest.max(value);
     });
     (sum / count, greatest)
+}
+
+/// Into how many parts edges of a facet are divided, so that none is longer than `longest`.
+fn parts<const D: usize>(corners: &[Point<D>; D], longest: f64) -> usize {
+    let pairs = (0..D).flat_map(|i| (0..i).map(move |j| (i, j)));
+    let side = pairs.map(|(i, j)| distance_squared(&corners[i], &corners[j])).fold(0.0, f64::max);
+    (side.sqrt() / longest).ceil().clamp(1.0, MOST_PARTS) as usize
 }
 
 /// Calls `visit` with the weights of the corners at the middles of the equal parts of a segment (`parts` of

@@ -1,6 +1,7 @@
 use proptest::prelude::*;
 
 use super::*;
+use crate::crests::FeaturePoint;
 use crate::fields::{Interpolation, ScalarField};
 use crate::geometry::Point;
 use crate::image::Grid;
@@ -146,6 +147,58 @@ fn of_two_small_ways_between_the_same_points_the_deeper_stays() {
     let [line] = &found.features[..] else { panic!("{found:?}") };
     assert_eq!(line.facets, (21..27).map(|a| [a, a + 1]).collect::<Vec<_>>());
     assert!(found.intersections.is_empty());
+}
+
+#[test]
+fn a_short_piece_that_joins_two_others_stays() {
+    // two lines along x, and one facet up between them; another facet up from the first ends free
+    let mesh = grid::<2>(6);
+    let passes = |c: &[Point<2>; 2]| {
+        let is_level = |y: f64| all(c, |p| p[1] == y);
+        let is_up = |x: f64| all(c, |p| p[0] == x && (2.0..=3.0).contains(&p[1]));
+        let is_free = all(c, |p| p[0] == 5.0 && (1.0..=2.0).contains(&p[1]));
+        is_level(2.0) || is_level(3.0) || is_up(3.0) || is_free
+    };
+    let options = FeatureFacetOptions { min_facets: 2, ..KEEP };
+    let found = chosen(&mesh, &options, passes);
+    assert_eq!((found.features.len(), found.selection.dropped), (5, 1));
+    assert!(found.features.iter().any(|feature| feature.facets.len() == 1));
+}
+
+/// Points of a crest across the middle of a grid, through `through`, two a step along each axis.
+fn crest<const D: usize>(n: usize, through: f64, normal: Point<D>) -> Vec<FeaturePoint<D>> {
+    let axis = (0..D).find(|&k| normal[k] != 0.0).unwrap();
+    let places = (0..(2 * n + 1).pow(D as u32)).map(|i| -> Point<D> {
+        std::array::from_fn(|k| 0.5 * (i / (2 * n + 1).pow(k as u32) % (2 * n + 1)) as f64)
+    });
+    let on = places.filter(|p| p[axis] == 0.0).map(|mut p| {
+        p[axis] = through;
+        FeaturePoint { index: 0, position: p, normal, strength: 0.7 }
+    });
+    on.collect()
+}
+
+fn facets_on_a_crest_are_found<const D: usize>() {
+    let mesh = grid::<D>(6);
+    let mut normal = [0.0; D];
+    normal[1] = 1.0;
+    let points = crest(6, 3.2, normal);
+    let field = FacetField::on_crests(&mesh, &points, 0.5, 0.3, &mut Silent).unwrap();
+    for (i, facet) in field.facets().iter().enumerate() {
+        let corners = facet.corners.map(|corner| mesh.points()[corner as usize]);
+        let share = if all(&corners, |p| p[1] == 3.0) { 1.0 } else { 0.0 };
+        // slanted facets and those beside the crest lie on it nowhere
+        assert_eq!(field.greatest()[i], -share, "{corners:?}");
+        assert!((field.mean()[i] + 0.7 * share).abs() < 1e-12);
+    }
+    let nothing = FacetField::on_crests(&mesh, &[], 0.5, 0.3, &mut Silent).unwrap();
+    assert!(nothing.greatest().iter().all(|&share| share == 0.0));
+}
+
+#[test]
+fn facets_lie_on_crests_that_are_near_and_turned_as_they_are() {
+    facets_on_a_crest_are_found::<2>();
+    facets_on_a_crest_are_found::<3>();
 }
 
 #[test]

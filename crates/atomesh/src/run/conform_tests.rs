@@ -232,6 +232,52 @@ fn what_cannot_conform_is_said() {
     assert_eq!(warnings(&image, conforming(5.0)), []);
 }
 
+/// Lines of random slants and places, so near to each other that no rows of atoms fit between.
+fn thicket() -> Image<2> {
+    let lines: Vec<(Point<2>, f64)> = (0..40)
+        .map(|i| {
+            let (sine, cosine) = (f64::from(i * i) * 0.7).sin_cos();
+            ([sine, cosine], f64::from(i * 37 % 97) - 30.0)
+        })
+        .collect();
+    image([96, 96], |p| {
+        let depth = |(normal, at): &(Point<2>, f64)| {
+            (-0.5 * ((p[0] * normal[0] + p[1] * normal[1] - at) / 1.2).powi(2)).exp()
+        };
+        -lines.iter().map(depth).fold(0.0, f64::max)
+    })
+}
+
+#[test]
+fn facets_along_ragged_features_are_tagged_though_no_atoms_were_put_on_these() {
+    let options = MeshOptions {
+        improve: ImproveOptions { align: Align::Auto, ..ImproveOptions::for_dimension(2) },
+        ..conforming(8.0, Features::Dark)
+    };
+    let outcome = run(&Method::plane(), &thicket(), options.clone());
+    assert!(outcome.run().pieces().is_none());
+    let found = outcome.features(outcome.mesh(), &Default::default(), &mut Silent).unwrap();
+    let facets: Vec<[u32; 2]> =
+        found.features.iter().flat_map(|feature| feature.facets.clone()).collect();
+    assert!(facets.len() > 30, "{}", facets.len());
+    let near = |p: &Point<2>| outcome.potential().value(p) < -0.3;
+    let middle = |facet: &[u32; 2]| -> Point<2> {
+        let [a, b] = facet.map(|corner| outcome.mesh().points()[corner as usize]);
+        std::array::from_fn(|k| 0.5 * (a[k] + b[k]))
+    };
+    // b is -0.6 at 1.2 samples from the middle of a line
+    let on = facets.iter().filter(|facet| near(&middle(facet))).count();
+    assert!(on as f64 >= 0.9 * facets.len() as f64, "{on} of {}", facets.len());
+    let tagged = outcome.tags().unwrap();
+    let names = tagged.facet_groups().iter().filter(|group| group.name.starts_with("feature-"));
+    assert_eq!(names.map(|group| group.facets.len()).sum::<usize>(), facets.len());
+    // the same mesh as without tags
+    let improve = ImproveOptions { align: Align::Full, ..options.improve };
+    let plain = run(&Method::plane(), &thicket(), MeshOptions { improve, ..options });
+    assert_eq!(plain.mesh(), outcome.mesh());
+    assert!(plain.tags().unwrap().facet_groups().iter().all(|g| !g.name.starts_with("feature-")));
+}
+
 #[test]
 fn what_is_not_met_is_said() {
     // a band whose sides are nearer to each other than atoms of two features may be: 0.45 d

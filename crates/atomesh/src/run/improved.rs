@@ -3,6 +3,9 @@
 use rayon::prelude::*;
 
 use crate::conform::{FeatureFacet, Unmet, feature_facets, unmet};
+use crate::features::{
+    FacetField, FacetTest, FacetsOfFeature, Feature, FeatureFacetOptions, find_features,
+};
 use crate::image::Samples;
 use crate::improve::ImproveReport;
 use crate::mesh::Mesh;
@@ -18,6 +21,11 @@ use super::prepared::{Parts, Prepared};
 
 /// The least share of features not met that is said.
 const LEAST_UNMET: f64 = 0.03;
+
+/// The least share of a facet along crests that makes it a facet of a feature, and the fewest facets of a piece of one
+/// with a free end or side, in the plane and in space.
+const LEAST_FOLLOWED: f64 = 0.5;
+const LEAST_FACETS: [usize; 2] = [1, 3];
 
 /// The mesh as it stays: facets on features, no cell flat.
 #[derive(Clone, Debug)]
@@ -74,6 +82,7 @@ pub(super) fn finish<const D: usize>(
     let at = |p| (potential.value(p) as f32).clamp(low, high);
     let potential_at_points = points.map(at).collect();
     let (feature_facets, not_met) = met_features(&run, &mesh);
+    let followed = followed_features(&run, &mesh, watch)?;
     let warnings = run.warnings().iter().cloned().chain(not_met).collect();
     Ok(Outcome {
         run,
@@ -86,6 +95,7 @@ pub(super) fn finish<const D: usize>(
         mirror_report,
         outline_facets,
         feature_facets,
+        followed,
         warnings,
         labels,
     })
@@ -106,6 +116,30 @@ fn met_features<const D: usize>(
         Warning::NotMet { share, place: place.join(",") }
     });
     (facets, warning)
+}
+
+/// The facets along crests of the image, where atoms were not put on these.
+fn followed_features<const D: usize>(
+    run: &Prepared<D>,
+    mesh: &Mesh<D>,
+    watch: &mut dyn Watch,
+) -> Result<Vec<FacetsOfFeature<D>>, RunError> {
+    let Parts { grid, crests, .. } = run.parts();
+    if crests.is_empty() {
+        return Ok(Vec::new());
+    }
+    let step = grid.step.iter().sum::<f64>() / D as f64;
+    let size = run.distance().mean();
+    let field = FacetField::on_crests(mesh, crests, step, (0.1 * size).max(step), watch)?;
+    let options = FeatureFacetOptions {
+        below: -LEAST_FOLLOWED,
+        test: FacetTest::Max,
+        min_facets: LEAST_FACETS[D - 2],
+        ..FeatureFacetOptions::default()
+    };
+    let found = find_features(mesh, &field, &options)?;
+    let of = |feature: Feature<D>| FacetsOfFeature { facets: feature.facets, mean: feature.mean };
+    Ok(found.features.into_iter().map(of).collect())
 }
 
 /// The label of each cell.

@@ -39,6 +39,8 @@ pub struct Outcome<const D: usize> {
     pub(super) outline_facets: Vec<[u32; D]>,
     /// The facets of the features that the mesh was made to keep to.
     pub(super) feature_facets: Vec<FeatureFacet<D>>,
+    /// The facets along features that the mesh was not made to keep to.
+    pub(super) followed: Vec<FacetsOfFeature<D>>,
     pub(super) warnings: Vec<Warning>,
     pub(super) labels: Option<Vec<i32>>,
 }
@@ -254,9 +256,12 @@ pub(super) fn features_of<const D: usize>(
     Ok(find_features(world, &field, options)?)
 }
 
-/// The features that the mesh was made to keep to.
+/// The features that the mesh was made to keep to, or that its facets follow.
 fn own_features<const D: usize>(outcome: &Outcome<D>, mesh: &Mesh<D>) -> Option<FeatureSet<D>> {
-    let pieces = outcome.run.pieces()?;
+    let Some(pieces) = outcome.run.pieces() else {
+        let followed = &outcome.followed;
+        return (!followed.is_empty()).then(|| FeatureSet::of_groups(mesh, followed));
+    };
     let mean = |piece: usize| -pieces.strength(piece as u32).min(1.0);
     let mut groups: Vec<FacetsOfFeature<D>> = (0..pieces.len())
         .map(|piece| FacetsOfFeature { facets: Vec::new(), mean: mean(piece) })

@@ -23,7 +23,10 @@ use super::prepared::{Parts, Prepared};
 const LEAST_VARIANCE: f64 = 0.8;
 /// The least depth of a valley at all, and over that of the deepest tenth.
 const LEAST_DEPTH: f32 = 0.05;
-const DEPTH_SHARE: f32 = 0.22;
+const DEPTH_SHARE: f32 = 0.3;
+
+/// The least depth of valleys that facets follow where atoms are not put on features, of 1.
+const FOLLOWED_DEPTH: f32 = 0.25;
 
 /// The depth that a group of bottoms reaches somewhere, over that of the deepest tenth. On a section of faults the
 /// groups of clutter reach 0.4, those of faults 0.48 and more.
@@ -72,13 +75,16 @@ pub(super) fn prepare<const D: usize>(
     warnings.extend(coarse(&grid, &distance));
     check(watch, Phase::Distance, 1.0, None)?;
     let potential = ScalarField::potential(grid, samples, options.interpolation)?;
-    let mut pieces = None;
+    let (mut pieces, mut crests) = (None, Vec::new());
     let asked = options.improve.align;
     if matches!(asked, Align::Auto | Align::Conform) {
         match why_not(&options, &grid, &distance, is_masked) {
             Some(why) if asked == Align::Conform => warnings.push(Warning::NotConforming { why }),
             Some(_) => {}
-            None => pieces = find_pieces(&inputs, &options, &potential, &distance, watch)?,
+            None => match find_features(&inputs, &options, &potential, &distance, watch)? {
+                Found::Pieces(found) => pieces = Some(found),
+                Found::Crests(found) => crests = found,
+            },
         }
         options.improve.align = if pieces.is_some() { Align::Conform } else { Align::Full };
     }
@@ -94,6 +100,7 @@ pub(super) fn prepare<const D: usize>(
         labels,
         warnings,
         pieces,
+        crests,
     }))
 }
 
@@ -147,14 +154,22 @@ fn why_not<const D: usize>(
     (distance.least() < mean_step).then_some("edges are shorter than the mean step of samples")
 }
 
-/// The pieces of features, if there are any.
-fn find_pieces<const D: usize>(
+/// Features that facets are to follow.
+enum Found<const D: usize> {
+    /// Atoms are put on these.
+    Pieces(Pieces<D>),
+    /// Too ragged for rows of atoms: facets are turned onto these. Or there are none.
+    Crests(Vec<FeaturePoint<D>>),
+}
+
+/// The features, in lattice coordinates.
+fn find_features<const D: usize>(
     inputs: &Inputs<'_, D>,
     options: &MeshOptions<D>,
     potential: &ScalarField<D>,
     distance: &NominalDistance<D>,
     watch: &mut dyn Watch,
-) -> Result<Option<Pieces<D>>, RunError> {
+) -> Result<Found<D>, RunError> {
     let grid = potential.grid();
     let kinds: Vec<FeatureOptions> = match &options.mixture {
         _ if inputs.is_potential => Vec::new(),
@@ -178,10 +193,25 @@ fn find_pieces<const D: usize>(
     let size = grid.in_samples(distance.least());
     let least_count = LEAST_PIECE[D - 2] * size.powi(D as i32 - 1);
     if options.improve.align == Align::Auto && Pieces::clean_share(&points, grid) < LEAST_CLEAN {
-        return Ok(None);
+        let valleys = wide_valleys(potential, distance, watch)?;
+        return Ok(Found::Crests(valleys));
     }
     let pieces = Pieces::new(points, grid, least_count.ceil() as usize);
-    Ok((!pieces.is_empty()).then_some(pieces))
+    Ok(if pieces.is_empty() { Found::Crests(Vec::new()) } else { Found::Pieces(pieces) })
+}
+
+/// The valleys of b that facets are measured against: of b smoothed by max(1, d/6) samples, deeper than a quarter, and in
+/// large groups; in lattice coordinates.
+fn wide_valleys<const D: usize>(
+    potential: &ScalarField<D>,
+    distance: &NominalDistance<D>,
+    watch: &mut dyn Watch,
+) -> Result<Vec<FeaturePoint<D>>, RunError> {
+    let grid = potential.grid();
+    let size = grid.in_samples(distance.least());
+    let sigma = (size / 6.0).max(1.0);
+    let found = enhance::valley_points(potential.samples(), grid, sigma, FOLLOWED_DEPTH, watch)?;
+    Ok(in_large_groups(found, grid.shape, size))
 }
 
 /// The bottoms of the deep valleys of b, in lattice coordinates.
