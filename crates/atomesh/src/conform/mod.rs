@@ -156,11 +156,12 @@ fn without_met<const D: usize>(
                 index += at * stride;
                 stride *= grid.shape[k];
             }
-            for i in ranges[0].clone() {
-                let along = i as f64 * grid.step[0] - place[0];
-                if along * along + beside <= reach * reach {
-                    samples[index + i] = 0.0;
-                }
+            let half = (reach * reach - beside).max(0.0).sqrt();
+            let first = ((place[0] - half) / grid.step[0]).ceil().max(0.0) as usize;
+            let end = ((place[0] + half) / grid.step[0]).floor().max(-1.0) + 1.0;
+            let end = (end as usize).min(grid.shape[0]);
+            if beside <= reach * reach && first < end {
+                samples[index + first..index + end].fill(0.0);
             }
         }
     }

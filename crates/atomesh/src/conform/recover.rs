@@ -141,7 +141,7 @@ fn crossing_place<const D: usize>(
 
 /// Brings free ends of crossing edges that are near onto the piece, or puts atoms at the crossings, where they are far
 /// enough from the piece's atoms; where nothing can be brought or put, takes away the free ends nearer to the pieces.
-/// Gives the lattice and whether it has changed.
+/// What an edge has been mended at stays for this round. Gives the lattice and whether it has changed.
 pub(super) fn recovered<const D: usize>(
     lattice: Lattice<D>,
     crossings: &[Crossing<D>],
@@ -149,22 +149,21 @@ pub(super) fn recovered<const D: usize>(
     distance: &NominalDistance<D>,
 ) -> (Lattice<D>, bool) {
     let mut mending = Mending::new(&lattice, pieces, distance);
-    crossings.iter().for_each(|crossing| mending.mend(crossing));
+    let stuck: Vec<Crossing<D>> =
+        crossings.iter().filter(|crossing| !mending.mend(crossing)).copied().collect();
     let Mending { places, is_touched, new, .. } = mending;
-    if !is_touched.contains(&true) {
-        let goes = ends_that_go(&lattice, crossings, distance);
-        let is_changed = goes.contains(&true);
-        return (lattice.retained(|i| !goes[i]), is_changed);
-    }
+    let goes = ends_that_go(&lattice, &stuck, &is_touched, distance);
+    let is_changed = goes.contains(&true) || is_touched.contains(&true);
     let is_moved: Vec<bool> =
         (lattice.atoms().iter().zip(&places)).map(|(from, to)| from != to).collect();
     let mut lattice = lattice.moved_to(places);
     for i in (0..is_moved.len()).filter(|&i| is_moved[i]) {
         lattice.set_temperature(i, 0.0);
     }
+    let mut lattice = lattice.retained(|i| !goes[i]);
     let bounds = *lattice.bounds();
     new.iter().for_each(|place| lattice.push(*place, bounds.freedom(place), 0.0));
-    (lattice, true)
+    (lattice, is_changed)
 }
 
 /// What is done about crossings, one after another.
@@ -205,11 +204,12 @@ impl<'a, const D: usize> Mending<'a, D> {
         }
     }
 
-    /// Brings the nearer end onto the piece, or else puts an atom at the crossing.
-    fn mend(&mut self, crossing: &Crossing<D>) {
+    /// Brings the nearer end onto the piece, or else puts an atom at the crossing. Whether something was done, here or at
+    /// an edge beside it.
+    fn mend(&mut self, crossing: &Crossing<D>) -> bool {
         let Crossing { ends, piece, .. } = *crossing;
         if ends.iter().any(|&end| self.is_touched[end as usize]) {
-            return;
+            return true;
         }
         if let Some((end, place)) = self.end_to_bring(crossing) {
             self.on.add(&place, piece);
@@ -218,7 +218,10 @@ impl<'a, const D: usize> Mending<'a, D> {
             self.on.add(&place, piece);
             ends.iter().for_each(|&end| self.is_touched[end as usize] = true);
             self.new.push(place);
+        } else {
+            return false;
         }
+        true
     }
 
     /// The nearer end and where it comes, if it is free, near the piece, and there is a place.
@@ -262,17 +265,19 @@ impl<'a, const D: usize> Mending<'a, D> {
     }
 }
 
-/// Which atoms go: of each crossing edge the nearer end, or the other one, that is free and not far from the piece.
+/// Which atoms go: of each crossing edge the nearer end, or the other one, that is free and not far from the piece. Edges
+/// at which something was touched wait.
 fn ends_that_go<const D: usize>(
     lattice: &Lattice<D>,
     crossings: &[Crossing<D>],
+    is_touched: &[bool],
     distance: &NominalDistance<D>,
 ) -> Vec<bool> {
     let mut goes = vec![false; lattice.len()];
     for Crossing { ends, heights, place, .. } in crossings {
         let nearer = usize::from(heights[1].abs() < heights[0].abs());
         let is_far = heights[nearer].abs() > FAR * distance.at(place);
-        if is_far || ends.iter().any(|&end| goes[end as usize]) {
+        if is_far || ends.iter().any(|&end| goes[end as usize] || is_touched[end as usize]) {
             continue;
         }
         let may_go = |end: u32| {

@@ -120,6 +120,21 @@ pub struct ImproveReport {
     pub floor_held: bool,
 }
 
+impl ImproveReport {
+    /// What was done in all, where a second improvement followed.
+    pub(crate) fn and(self, next: Self) -> Self {
+        Self {
+            rounds: self.rounds + next.rounds,
+            swaps: self.swaps + next.swaps,
+            moves: self.moves + next.moves,
+            removed: self.removed + next.removed,
+            added: self.added + next.added,
+            angle_before: self.angle_before,
+            ..next
+        }
+    }
+}
+
 /// What of a mesh stays.
 #[derive(Clone, Copy, Debug)]
 pub struct Held<'a, const D: usize> {

@@ -4,7 +4,7 @@ use std::collections::HashSet;
 
 use crate::conform::feature_facets;
 use crate::crests::Pieces;
-use crate::improve::{Align, Held, ImproveReport, Improver};
+use crate::improve::{Align, Held, ImproveOptions, ImproveReport, Improver};
 use crate::measure::cell_shape;
 use crate::mesh::Mesh;
 use crate::mirror::MirrorReport;
@@ -73,21 +73,24 @@ pub(super) fn improve<const D: usize>(
     Ok(Improved { run, mesh, report, mirror_report, improve_report: Some(improved) })
 }
 
+/// The floor of angles that is tried for around features, in the plane and in space, in degrees: rows of atoms leave room
+/// for it. What must be held is what was asked for.
+const TRIED_ANGLE: [f64; 2] = [25.0, 15.0];
+
+/// How far from bad cells what is held is given free, time after time, in rings of cells around them.
+const RELEASES: [usize; 3] = [0, 1, 3];
+
 /// Improves a mesh around its facets on features. Where cells stay below the floor of angles, the floor wins: facets
 /// and points of features at such cells are given free, and the mesh is improved once more.
 fn improve_around<const D: usize>(
     pieces: &Pieces<D>,
     mesh: Mesh<D>,
-    freedom: Vec<u8>,
+    mut freedom: Vec<u8>,
     run: &Prepared<D>,
     improver: &dyn Improver<D>,
     watch: &mut dyn Watch,
 ) -> Result<(Mesh<D>, ImproveReport), RunError> {
-    let (options, bounds) = (&run.options().improve, run.bounds());
-    let facets = |mesh: &Mesh<D>| -> Vec<[u32; D]> {
-        let found = feature_facets(mesh, pieces, run.distance());
-        found.iter().map(|facet| facet.corners).collect()
-    };
+    let (options, bounds, fields) = (&run.options().improve, run.bounds(), run.fields());
     let fixed: HashSet<[u64; D]> = match run.options().seed_points.is_empty() {
         true => HashSet::new(),
         false => (freedom.iter().zip(mesh.points()))
@@ -95,38 +98,52 @@ fn improve_around<const D: usize>(
             .map(|(_, p)| p.map(f64::to_bits))
             .collect(),
     };
+    let facets = |mesh: &Mesh<D>| -> Vec<[u32; D]> {
+        let found = feature_facets(mesh, pieces, run.distance());
+        found.iter().map(|facet| facet.corners).collect()
+    };
+    let min_angle = options.min_angle.max(TRIED_ANGLE[D - 2]);
+    let tried = ImproveOptions { min_angle, ..*options };
     let held = facets(&mesh);
-    let fields = run.fields();
     let held = Held { freedom: &freedom, facets: &held };
-    let (mesh, mut first) = improver.improve(mesh, held, fields, options, watch)?;
-    if first.floor_held {
-        return Ok((mesh, first));
+    let (mut mesh, mut report) = improver.improve(mesh, held, fields, &tried, watch)?;
+    for rings in RELEASES {
+        let is_released = near_bad_cells(&mesh, options.min_angle, rings);
+        if !is_released.contains(&true) {
+            (report.below, report.floor_held) = (0, true);
+            break;
+        }
+        let mut held = facets(&mesh);
+        held.retain(|facet| !facet.iter().any(|&corner| is_released[corner as usize]));
+        let mut is_held = vec![false; mesh.points().len()];
+        held.iter().flatten().for_each(|&corner| is_held[corner as usize] = true);
+        freedom = (mesh.points().iter().zip(&is_held))
+            .map(|(p, is_held)| match *is_held || fixed.contains(&p.map(f64::to_bits)) {
+                true => 0,
+                false => bounds.freedom(p),
+            })
+            .collect();
+        let held = Held { freedom: &freedom, facets: &held };
+        let (better, next) = improver.improve(mesh, held, fields, options, watch)?;
+        (mesh, report) = (better, report.and(next));
     }
-    let mut is_released = vec![false; mesh.points().len()];
+    Ok((mesh, report))
+}
+
+/// The corners of cells with an angle below the floor, and, `rings` times, those of the cells around them.
+fn near_bad_cells<const D: usize>(mesh: &Mesh<D>, floor: f64, rings: usize) -> Vec<bool> {
+    let mut is_near = vec![false; mesh.points().len()];
+    let mut mark = |cell: &[u32]| cell.iter().for_each(|&corner| is_near[corner as usize] = true);
     for (cell, simplex) in mesh.cells().zip(mesh.simplices()) {
-        if cell_shape(&simplex.edges()).least_angle < options.min_angle {
-            cell.iter().for_each(|&corner| is_released[corner as usize] = true);
+        if cell_shape(&simplex.edges()).least_angle < floor {
+            mark(cell);
         }
     }
-    let held: Vec<[u32; D]> = (facets(&mesh).into_iter())
-        .filter(|facet| !facet.iter().any(|&corner| is_released[corner as usize]))
-        .collect();
-    let mut is_held = vec![false; mesh.points().len()];
-    held.iter().flatten().for_each(|&corner| is_held[corner as usize] = true);
-    let freedom: Vec<u8> = (mesh.points().iter().zip(&is_held))
-        .map(|(p, is_held)| match *is_held || fixed.contains(&p.map(f64::to_bits)) {
-            true => 0,
-            false => bounds.freedom(p),
-        })
-        .collect();
-    let held = Held { freedom: &freedom, facets: &held };
-    let (mesh, second) = improver.improve(mesh, held, fields, options, watch)?;
-    first.rounds += second.rounds;
-    first.swaps += second.swaps;
-    first.moves += second.moves;
-    first.removed += second.removed;
-    first.added += second.added;
-    (first.angle_after, first.below) = (second.angle_after, second.below);
-    first.floor_held = second.floor_held;
-    Ok((mesh, first))
+    for _ in 0..rings {
+        let before = is_near.clone();
+        for cell in mesh.cells().filter(|cell| cell.iter().any(|&c| before[c as usize])) {
+            cell.iter().for_each(|&corner| is_near[corner as usize] = true);
+        }
+    }
+    is_near
 }

@@ -6,11 +6,14 @@ use rayon::prelude::*;
 
 use super::super::{Bins, FeaturePoint, PointGrid};
 use super::link::{Alike, later_neighbours};
-use crate::geometry::{Bounds, Sets, difference, distance_squared, dot};
+use crate::geometry::{Bounds, Sets, difference, dot};
 
 /// Points this near to a piece's are explained by it, in mean steps; and those in the flank of its valley, where noise
 /// makes valleys of its own: as near as this, and weaker by this.
 const EXPLAINED: f64 = 1.6;
+/// In space a piece explains points as far as this, in mean steps, that are so near to its plane: where sheets cross, what
+/// lies between the two.
+const EXPLAINED_ALONG: f64 = 4.5;
 const FLANK: f64 = 3.5;
 const WEAKER: f64 = 0.6;
 /// A piece is one layer: within this, in mean steps, no point of it stands beside another, above its plane by more than
@@ -86,12 +89,15 @@ fn unexplained<const D: usize>(
 ) -> Vec<FeaturePoint<D>> {
     let grid = PointGrid::new(bounds, 2.0 * step, points.iter().map(|point| point.position));
     let (near, flank) = (EXPLAINED * step, FLANK * step);
+    let along = if D == 2 { near } else { EXPLAINED_ALONG * step };
     let is_free = |point: &FeaturePoint<D>| {
         let mut is_free = true;
-        grid.near(&point.position, flank, |place, i| {
-            let squared = distance_squared(place, &point.position);
+        grid.near(&point.position, flank.max(along), |place, i| {
+            let offset = difference(place, &point.position);
+            let squared = dot(&offset, &offset);
             let is_weaker = point.strength < WEAKER * points[i].strength;
-            is_free &= squared >= near * near && (squared >= flank * flank || !is_weaker);
+            let is_on = squared < along * along && dot(&offset, &points[i].normal).abs() < near;
+            is_free &= squared >= near * near && !is_on && (squared >= flank * flank || !is_weaker);
         });
         is_free
     };

@@ -18,10 +18,13 @@ pub(super) const SUPPORT: f64 = 4.0;
 const LEAST_SUPPORT: f64 = 0.7;
 /// Points of one feature near each other have normals with at least this cosine, 21°.
 const ALIKE: f64 = 0.93;
-/// Points with other normals within this, in mean steps, are of a feature that meets the point's own.
-const NEXT: f64 = 2.0;
-/// The greatest share of them.
-const MOST_OTHERS: f64 = 0.12;
+/// Points with other normals near a point are of a feature that meets the point's own.
+const NEXT: Next = Next { reach: 2.0, most: 0.12 };
+/// The same in space, where sheets cross along lines, and their valleys pass over into each other somewhere along these.
+const NEXT_IN_SPACE: Next = Next { reach: 3.5, most: 0.1 };
+/// In space points this near to a side of the image, in mean steps, say nothing: samples mirrored there turn their normals,
+/// and sheets at a slant pass over into each other. Pieces are led on to sides.
+const AT_SIDE: f64 = 2.5;
 /// How many points are asked for the share of those on clean features.
 const ASKED: usize = 20_000;
 /// Sets of fewer points, in space of fewer than the square, are linked anew with what is left.
@@ -31,6 +34,13 @@ const ACROSS: Alike = Alike { reach: 0.0, cosine: 0.96, slope: 0.08, slack: 0.4 
 const OVER_GAPS: Alike = Alike { reach: 0.0, cosine: 0.88, slope: 0.22, slack: 0.4 };
 /// The fewest points on a point's plane, itself among them, in the plane; twice as many in space.
 const LEAST_ON: usize = 4;
+
+/// How near points with other normals count, in mean steps, and their greatest share.
+#[derive(Clone, Copy, Debug)]
+struct Next {
+    reach: f64,
+    most: f64,
+}
 
 /// The points of pieces, their normals turned to agree, with some more where pieces were joined; and the sets that
 /// make a piece each.
@@ -42,6 +52,7 @@ pub(super) fn linked_pieces<const D: usize>(
     let bounds = grid.bounds();
     let reach = LINK * dot(&grid.step, &grid.step).sqrt();
     let alike = Alike { reach, cosine: 0.8, slope: 0.4, slack: 0.35 };
+    let points = if D > 2 { off_sides(points, &bounds, AT_SIDE * step) } else { points };
     let (mut points, mut others) = supported(points, &bounds, step);
     points.sort_by_key(|point| point.index);
     let mut sets = Sets::new(points.len());
@@ -58,6 +69,19 @@ pub(super) fn linked_pieces<const D: usize>(
     }
     turn(&mut points, &links);
     (points, sets)
+}
+
+/// The points farther than `near` from all sides of the box.
+fn off_sides<const D: usize>(
+    mut points: Vec<FeaturePoint<D>>,
+    bounds: &Bounds<D>,
+    near: f64,
+) -> Vec<FeaturePoint<D>> {
+    points.retain(|point| {
+        let p = &point.position;
+        (0..D).all(|k| p[k] >= bounds.min[k] + near && p[k] <= bounds.max[k] - near)
+    });
+    points
 }
 
 /// Takes out the points of sets too small to say how a feature goes on.
@@ -124,7 +148,8 @@ fn supported<const D: usize>(
     bounds: &Bounds<D>,
     step: f64,
 ) -> (Vec<FeaturePoint<D>>, Vec<FeaturePoint<D>>) {
-    let is_kept = are_supported(&points, bounds, step, 1);
+    let is_kept =
+        are_supported(&points, bounds, step, 1, if D == 2 { NEXT } else { NEXT_IN_SPACE });
     let (mut kept, mut others) = (Vec::new(), Vec::new());
     for (point, is_kept) in points.into_iter().zip(is_kept) {
         if is_kept {
@@ -140,7 +165,7 @@ fn supported<const D: usize>(
 pub(super) fn clean_share<const D: usize>(points: &[FeaturePoint<D>], grid: &Grid<D>) -> f64 {
     let step = grid.step.iter().sum::<f64>() / D as f64;
     let stride = (points.len() / ASKED).max(1);
-    let are_supported = are_supported(points, &grid.bounds(), step, stride);
+    let are_supported = are_supported(points, &grid.bounds(), step, stride, NEXT);
     let count = are_supported.iter().filter(|&&is| is).count();
     count as f64 / are_supported.len().max(1) as f64
 }
@@ -151,6 +176,7 @@ fn are_supported<const D: usize>(
     bounds: &Bounds<D>,
     step: f64,
     stride: usize,
+    next_to: Next,
 ) -> Vec<bool> {
     let bins = PointGrid::new(bounds, 1.5 * step, points.iter().map(|point| point.position));
     let reach = SUPPORT * step;
@@ -163,7 +189,7 @@ fn are_supported<const D: usize>(
             if squared > reach * reach {
                 return;
             }
-            let is_next = squared <= (NEXT * step).powi(2);
+            let is_next = squared <= (next_to.reach * step).powi(2);
             next += usize::from(is_next);
             if dot(&points[j].normal, &point.normal).abs() < ALIKE {
                 // of another feature, or around a bend
@@ -175,7 +201,7 @@ fn are_supported<const D: usize>(
             on += usize::from(height <= 0.12 * squared.sqrt() + 0.3 * step);
         });
         on >= LEAST_ON * (D - 1)
-            && others as f64 <= MOST_OTHERS * next as f64
+            && others as f64 <= next_to.most * next as f64
             && on as f64 >= LEAST_SUPPORT * all as f64
     };
     let count = points.len().div_ceil(stride);

@@ -143,10 +143,11 @@ impl<const D: usize> Patch<D> {
 
     /// The same beyond the bent part as on its tangent plane.
     fn height_anywhere(&self, u: f64, v: f64) -> (f64, [f64; 2]) {
-        let radius = u.hypot(v);
-        if radius <= BENT {
+        let squared = u * u + v * v;
+        if squared <= BENT * BENT {
             return self.height(u, v);
         }
+        let radius = squared.sqrt();
         let [rim_u, rim_v] = [u * BENT / radius, v * BENT / radius];
         let (height, along) = self.height(rim_u, rim_v);
         (height + along[0] * (u - rim_u) + along[1] * (v - rim_v), along)
@@ -173,7 +174,7 @@ impl<const D: usize> Patch<D> {
             let (height, along) = self.height_anywhere(u, v);
             let slopes = along.map(|slope| slope / step);
             let rest = above - height;
-            let bent = if u.hypot(v) <= BENT { 2.0 * rest / (step * step) } else { 0.0 };
+            let bent = if u * u + v * v <= BENT * BENT { 2.0 * rest / (step * step) } else { 0.0 };
             let change = |k: usize, at: f64| {
                 let stiff = (1.0 + slopes[k] * slopes[k] - bent * bends[k]).max(0.4);
                 (to[k] - at + slopes[k] * rest / step) / stiff
