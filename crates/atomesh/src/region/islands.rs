@@ -1,4 +1,4 @@
-//! Islands, small groups of cells that take the label of a neighbour.
+//! Cells that take a label from their neighbours: those of islands, and those without a label.
 
 use std::cmp::Reverse;
 use std::collections::{BinaryHeap, HashMap};
@@ -138,6 +138,32 @@ fn most_frequent(mut labels: Vec<i32>) -> Option<i32> {
     counts.max().map(|(_, Reverse(label))| label)
 }
 
+/// The labels with those filled in that are not known: the cells beside known ones first, each with the label with which
+/// it shares most facets (of equal ones the least), then those beside these. 0 for cells that no path through facets
+/// leads to from a known one. Cost: O(cells), and O(cells unknown) for each facet that the farthest of them is away.
+pub(crate) fn fill_labels<const D: usize>(mesh: &Mesh<D>, labels: &[Option<i32>]) -> Vec<i32> {
+    let mut labels = labels.to_vec();
+    // an unknown cell and one beside it
+    let mut shores: Vec<(u32, u32)> = Vec::new();
+    if labels.contains(&None) {
+        let both = neighbours(mesh).into_iter().flat_map(|(a, b)| [(a, b), (b, a)]);
+        shores.extend(both.filter(|(cell, _)| labels[*cell as usize].is_none()));
+    }
+    shores.sort_unstable();
+    loop {
+        let mut found = Vec::new();
+        for shore in shores.chunk_by(|a, b| a.0 == b.0) {
+            let known = shore.iter().filter_map(|(_, other)| labels[*other as usize]).collect();
+            found.extend(most_frequent(known).map(|label| (shore[0].0, label)));
+        }
+        if found.is_empty() {
+            return labels.into_iter().map(Option::unwrap_or_default).collect();
+        }
+        found.into_iter().for_each(|(cell, label)| labels[cell as usize] = Some(label));
+        shores.retain(|(cell, _)| labels[*cell as usize].is_none());
+    }
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;
@@ -248,5 +274,12 @@ mod tests {
         assert_eq!(join(&[4; 6], 1000), (vec![4; 6], 0));
         // the whole becomes one group, smaller than asked for
         assert_eq!(join(&[1, 2, 2], 9), (vec![2; 3], 1));
+    }
+
+    #[test]
+    fn unknown_labels_come_from_the_nearest_known() {
+        let labels = [None, None, Some(3), None, Some(1), Some(1), None, None, None];
+        assert_eq!(fill_labels(&strip(9), &labels), [3, 3, 3, 1, 1, 1, 1, 1, 1]);
+        assert_eq!(fill_labels(&strip(2), &[None, None]), [0, 0]);
     }
 }

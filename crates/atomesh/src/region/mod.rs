@@ -5,7 +5,7 @@
 //! - [`smooth_outline`] moves points on and beside the outline to better places, [`fit_facets`] makes up for what facets
 //!   cut off.
 //! - [`interfaces`] lie between cells of two labels, a [`closed_surface`] bounds those of one; [`join_islands`] removes
-//!   small groups of cells.
+//!   small groups of cells. A [`ThinLayer`] of a label is too thin for the edges asked for.
 //! - [`components`] are the parts into which facets cut a mesh.
 //!
 //! Outlines come before the lattice, which grows on them; labels need only a mesh.
@@ -14,6 +14,7 @@ mod adjust;
 mod components;
 mod islands;
 mod labels;
+mod layers;
 mod manifold;
 mod outline;
 mod regularity;
@@ -21,9 +22,13 @@ mod trim;
 
 pub use adjust::{fit_facets, smooth_outline};
 pub use components::components;
+pub(crate) use islands::fill_labels;
 pub use islands::join_islands;
 pub use labels::{Interface, closed_surface, interfaces, label_samples};
+pub use layers::ThinLayer;
+pub(crate) use layers::{LabelImage, thin_layers};
 pub use outline::Outline;
+pub(crate) use outline::samples_inside;
 pub(crate) use trim::free_axes;
 pub use trim::{Trimmed, outline_facets, trim_to_outline};
 
