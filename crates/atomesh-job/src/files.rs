@@ -7,6 +7,7 @@ use atomesh_draw::{Picture, PictureFormat};
 use atomesh_io::atomic_file::AtomicFile;
 use atomesh_io::image::ImageFormat;
 use atomesh_io::mesh::MeshFormat;
+use atomesh_io::surface::SurfaceFormat;
 
 use crate::error::JobError;
 use crate::session::Session;
@@ -93,6 +94,18 @@ fn absolute(path: &Path) -> PathBuf {
 /// An error that names the file extensions that are known.
 pub fn unknown_extension(path: &Path, known: &str) -> JobError {
     JobError::misuse(format!("unknown file extension; expected one of {known}")).about(path)
+}
+
+/// The format of a surface file by its name.
+///
+/// # Errors
+/// [`JobError`] if the extension is unknown.
+pub(crate) fn surface_format(path: &Path) -> Result<SurfaceFormat, JobError> {
+    SurfaceFormat::of(path).map_err(|_| {
+        let known = SurfaceFormat::EXTENSIONS;
+        let message = format!("unknown extension of a surface file; expected one of {known}");
+        JobError::misuse(message).about(path)
+    })
 }
 
 /// Whether a file has an extension, in upper or lower case.

@@ -8,8 +8,8 @@
 //! - [`values`]: how values such as `6..18` or `120,40:rate=2` are spelt.
 //! - [`images`], [`mesh_file`]: reading, with what a reader took for granted as notes.
 //! - jobs, in memory and from file to file: [`mesh`](mod@mesh), [`flow`](mod@flow), [`features`](mod@features),
-//!   [`sample`], [`export`], [`enhance`], [`measure`]. Files to write are checked before the work and appear whole
-//!   or not at all.
+//!   [`surfaces`], [`sample`], [`export`], [`enhance`], [`measure`]. Files to write are checked before the work and
+//!   appear whole or not at all.
 //! - [`memory`]: how much is left, how much was used.
 //!
 //! Nothing here prints, ends the process or installs a signal handler. A job takes a [`Session`], which passes
@@ -65,6 +65,7 @@ mod page;
 mod permeability;
 pub mod sample;
 mod session;
+pub mod surfaces;
 pub mod values;
 
 pub use dimension::Dimension;

@@ -11,4 +11,5 @@ pub mod man;
 pub mod mesh;
 pub mod report;
 pub mod sample;
+pub mod surfaces;
 pub mod synth;

@@ -1,7 +1,8 @@
 //! Tags go through every format that holds them, and stay as they were.
 
 use atomesh::geometry::Bounds;
-use atomesh::mesh::{Delaunay, FacetGroup, Mesh, Regions, Tags};
+use atomesh::mesh::{Delaunay, FacetGroup, Mesh, Regions, Tags, interface_name};
+use atomesh::region::{Interface, interfaces};
 use atomesh::watch::Silent;
 use atomesh_io::mesh::inp::read_inp;
 use atomesh_io::mesh::msh::{MshEncoding, MshVersion, read_msh};
@@ -126,6 +127,60 @@ fn regions_keep_their_numbers_even_those_below_one_and_their_names() {
     check(&mesh, &tagged(&mesh, Some(regions(mesh.cell_count(), &names))), volume);
     let alone = Tags::new(&mesh, vec![], Some(regions(mesh.cell_count(), &[]))).unwrap();
     check(&mesh, &alone, volume);
+}
+
+/// Interfaces of regions without an order, and after them a feature on the facets of the first, turned the other
+/// way.
+fn with_interfaces<const D: usize>(mesh: &Mesh<D>) -> Tags<D> {
+    let labels = (0..mesh.cell_count()).map(|cell| [3, -1, 0][cell * cell % 7 % 3]);
+    let regions = Regions { of_cells: labels.collect(), names: Vec::new() };
+    let mut groups: Vec<FacetGroup<D>> = interfaces(mesh, &regions.of_cells)
+        .into_iter()
+        .zip(1..)
+        .map(|(Interface { labels, facets }, id)| FacetGroup {
+            id,
+            name: interface_name(labels),
+            facets,
+        })
+        .collect();
+    let turned = groups[0].facets.iter().map(|facet| {
+        let mut facet = *facet;
+        facet.swap(D - 2, D - 1);
+        facet
+    });
+    let feature = FacetGroup { id: 50, name: "feature-1".into(), facets: turned.collect() };
+    groups.push(feature);
+    Tags::new(mesh, groups, Some(regions)).unwrap()
+}
+
+/// Interfaces run from the lower label to the higher in every file, whatever other groups have their facets.
+fn check_interfaces<const D: usize>(
+    mesh: &Mesh<D>,
+    pick: impl Fn(AnyMesh) -> Option<LoadedMesh<D>>,
+) {
+    let folder = tempfile::tempdir().unwrap();
+    let tags = with_interfaces(mesh);
+    for (name, format) in FORMATS {
+        let path = folder.path().join(name);
+        let data = MeshData::new(mesh).with_tags(&tags);
+        write_mesh_as(&path, format, &data, &mut Silent).unwrap();
+        let read = pick(read_mesh(&path).unwrap()).unwrap();
+        let without_feature = |tags: &Tags<D>| {
+            let mut groups = canonical(tags);
+            groups.retain(|(id, ..)| *id != 50);
+            groups
+        };
+        assert_eq!(without_feature(&read.tags), without_feature(&tags), "{name}");
+        assert_eq!(read.tags.regions(), tags.regions(), "{name}");
+        let feature = read.tags.facet_group("feature-1").unwrap();
+        assert_eq!(feature.facets.len(), tags.facet_groups()[0].facets.len(), "{name}");
+    }
+}
+
+#[test]
+fn interfaces_run_from_the_lower_label_to_the_higher_in_every_file() {
+    check_interfaces(&Delaunay::<2>::new().connect(&points(4), &mut Silent).unwrap(), flat);
+    check_interfaces(&Delaunay::<3>::new().connect(&points(3), &mut Silent).unwrap(), volume);
 }
 
 #[test]

@@ -12,7 +12,7 @@ use serde_json::json;
 use super::FeaturesRequest;
 use crate::dimension::Dimension;
 use crate::error::JobError;
-use crate::files::{self, write_bytes};
+use crate::files::{self, surface_format, write_bytes};
 use crate::mesh_file;
 use crate::session::Session;
 
@@ -119,14 +119,6 @@ impl<'a> FeatureFiles<'a> {
         }
         tags.merge(found.tags(mesh).map_err(JobError::content)?).map_err(JobError::content)
     }
-}
-
-fn surface_format(path: &Path) -> Result<SurfaceFormat, JobError> {
-    SurfaceFormat::of(path).map_err(|_| {
-        let known = SurfaceFormat::EXTENSIONS;
-        let message = format!("unknown extension of a surface file; expected one of {known}");
-        JobError::misuse(message).about(path)
-    })
 }
 
 /// The mesh with new tags and all else that it had.

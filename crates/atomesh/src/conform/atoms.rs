@@ -19,7 +19,7 @@ const SETTLED: f64 = 0.55;
 /// The least distance of atoms on surfaces from the sides of the box, over d.
 const SIDE: f64 = 0.4;
 /// An atom nearer to a side of the box than this is on it, in mean steps.
-const ON_SIDE: f64 = 0.05;
+pub(super) const ON_SIDE: f64 = 0.05;
 /// How often atoms on surfaces are brought onto their pieces, how often they are moved by the pair force each time, and
 /// how far at most, over d.
 const SWEEPS: usize = 8;
@@ -213,7 +213,11 @@ fn pushed<const D: usize>(
 }
 
 /// The place itself, put on the sides of the box that are nearer than `near`.
-fn onto_sides<const D: usize>(place: &Point<D>, bounds: &Bounds<D>, near: f64) -> Point<D> {
+pub(super) fn onto_sides<const D: usize>(
+    place: &Point<D>,
+    bounds: &Bounds<D>,
+    near: f64,
+) -> Point<D> {
     std::array::from_fn(|k| {
         let sides = [bounds.min[k], bounds.max[k]];
         sides.into_iter().find(|side| (place[k] - side).abs() <= near).unwrap_or(place[k])

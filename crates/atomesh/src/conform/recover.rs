@@ -10,6 +10,7 @@ use crate::geometry::{Point, distance_squared};
 use crate::lattice::Lattice;
 use crate::mesh::Mesh;
 
+use super::atoms::{ON_SIDE, onto_sides};
 use super::facets::pieces_at;
 
 /// A new atom is as far as this from the atoms of its piece, over d.
@@ -250,7 +251,9 @@ impl<'a, const D: usize> Mending<'a, D> {
     fn place_for_an_atom(&self, crossing: &Crossing<D>) -> Option<Point<D>> {
         let Crossing { ends, piece, place, .. } = crossing;
         let d = self.distance.at(place);
-        let place = self.lattice.bounds().clamp(place);
+        // a foot beside a side of the box may be within a rounding of it
+        let (bounds, near) = (self.lattice.bounds(), ON_SIDE * self.pieces.step());
+        let place = onto_sides(&bounds.clamp(place), bounds, near);
         let mut is_alone = true;
         self.all.near(&place, ALONE * d, |i| {
             let squared = distance_squared(&self.lattice.atoms()[i], &place);

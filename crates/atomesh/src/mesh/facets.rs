@@ -53,6 +53,15 @@ impl<const D: usize> Mesh<D> {
         facet
     }
 
+    /// The facet of a cell that has these corners, in any order, turned as [`Mesh::facet_of`] turns it; `None` if the
+    /// cell has no such facet.
+    pub(crate) fn facet_out_of(&self, cell: u32, corners: &[u32; D]) -> Option<[u32; D]> {
+        let at = cell as usize * Self::CORNERS;
+        let own = &self.corners[at..at + Self::CORNERS];
+        let opposite = own.iter().position(|corner| !corners.contains(corner))?;
+        corners.iter().all(|c| own.contains(c)).then(|| self.facet_of(cell as usize, opposite))
+    }
+
     /// The facet's normal, as long as the facet is long (2-D) or large (3-D).
     ///
     /// # Panics
@@ -190,6 +199,8 @@ mod tests {
                 if k == 0 { [0.5; 3] } else { [1, 2, 3].map(|j| if j == k { -0.5 } else { 0.0 }) };
             assert_eq!(normal.map(|x| x + 0.0), expected, "{k}");
         }
+        assert_eq!(space.facet_out_of(0, &[0, 2, 3]), Some(space.facet_of(0, 1)));
+        assert_eq!(space.facet_out_of(0, &[0, 2, 9]), None);
     }
 
     #[test]

@@ -1,12 +1,12 @@
 //! Cells by the labels of an image.
 //!
-//! `sample` says which label a cell has; here is what follows from labels: islands and interfaces.
+//! `sample` says which label a cell has; here is what follows from labels: the interfaces between two of them, and the
+//! closed surface of one.
 
 use rayon::prelude::*;
 
-use crate::geometry::Sets;
 use crate::image::Samples;
-use crate::mesh::Mesh;
+use crate::mesh::{Facet, Mesh};
 
 use super::RegionError;
 
@@ -23,48 +23,6 @@ pub fn label_samples(samples: &Samples) -> Result<Vec<i32>, RegionError> {
     let labels: Vec<Result<i32, RegionError>> =
         (0..samples.len()).into_par_iter().with_min_len(1 << 14).map(label).collect();
     labels.into_iter().collect()
-}
-
-/// Gives the cells of islands, groups of fewer than `least` cells of one label connected by facets, the label with
-/// which the island shares most facets (of equal ones the least). Returns how many cells have another label now.
-/// Groups are found once: what an island joins may be an island itself.
-pub fn join_islands<const D: usize>(mesh: &Mesh<D>, labels: &mut [i32], least: usize) -> usize {
-    let facets = mesh.facets();
-    let pairs: Vec<(u32, u32)> =
-        facets.iter().filter_map(|f| f.neighbour.map(|other| (f.cell, other))).collect();
-    let mut groups = Sets::new(labels.len());
-    for &(a, b) in &pairs {
-        if labels[a as usize] == labels[b as usize] {
-            groups.join(a, b);
-        }
-    }
-    let roots = groups.roots();
-    let mut sizes = vec![0_usize; labels.len()];
-    roots.iter().for_each(|&r| sizes[r as usize] += 1);
-    // an island and a label beside it, once for each facet between them
-    let mut shores: Vec<(u32, i32)> = Vec::new();
-    for &(a, b) in &pairs {
-        for (cell, other) in [(a, b), (b, a)] {
-            let r = roots[cell as usize];
-            if sizes[r as usize] < least && roots[other as usize] != r {
-                shores.push((r, labels[other as usize]));
-            }
-        }
-    }
-    shores.sort_unstable();
-    let mut becomes = vec![None; labels.len()];
-    for island in shores.chunk_by(|a, b| a.0 == b.0) {
-        let best = island.chunk_by(|a, b| a.1 == b.1).map(|g| (g.len(), std::cmp::Reverse(g[0].1)));
-        becomes[island[0].0 as usize] = best.max().map(|(_, label)| label.0);
-    }
-    let mut changed = 0;
-    for (cell, label) in labels.iter_mut().enumerate() {
-        if let Some(new) = becomes[roots[cell] as usize] {
-            *label = new;
-            changed += 1;
-        }
-    }
-    changed
 }
 
 /// The facets between the cells of two labels.
@@ -84,19 +42,14 @@ pub fn interfaces<const D: usize>(mesh: &Mesh<D>, labels: &[i32]) -> Vec<Interfa
     assert_eq!(labels.len(), mesh.cell_count(), "one label a cell");
     let mut found: Vec<([i32; 2], [u32; D])> = (mesh.facets().iter())
         .filter_map(|facet| {
-            let (a, b) = (labels[facet.cell as usize], labels[facet.neighbour? as usize]);
-            if a == b {
-                return None;
-            }
-            let mut at = (0..=D).map(|opposite| mesh.facet_of(facet.cell as usize, opposite));
-            let mut outward = at.find(|found| is_facet(found, &facet.corners))?;
-            if a > b {
-                outward.swap(D - 2, D - 1);
-            }
-            Some(([a.min(b), a.max(b)], outward))
+            let (cell, other) = (facet.cell, facet.neighbour?);
+            let (a, b) = (labels[cell as usize], labels[other as usize]);
+            let lower = if a < b { cell } else { other };
+            (a != b).then_some(())?;
+            Some(([a.min(b), a.max(b)], mesh.facet_out_of(lower, &facet.corners)?))
         })
         .collect();
-    found.sort_by_key(|(labels, facet)| (*labels, ascending(facet)));
+    found.sort_by_key(|(labels, _)| *labels); // stable: facets stay in their order
     found
         .chunk_by(|a, b| a.0 == b.0)
         .map(|group| Interface {
@@ -106,20 +59,41 @@ pub fn interfaces<const D: usize>(mesh: &Mesh<D>, labels: &[i32]) -> Vec<Interfa
         .collect()
 }
 
-fn ascending<const D: usize>(facet: &[u32; D]) -> [u32; D] {
-    let mut sorted = *facet;
-    sorted.sort_unstable();
-    sorted
-}
-
-/// Whether the corners of a facet are these, which ascend.
-fn is_facet<const D: usize>(facet: &[u32; D], corners: &[u32; D]) -> bool {
-    ascending(facet) == *corners
+/// The closed surface of the cells of one label: the facets between a cell of that label and a cell of another or none,
+/// their normals out of the label, in the order of their ascending corners. Each ridge, a point in 2-D and an edge in 3-D,
+/// is shared by an even number of them. None if no cell has the label. Cost: O(cells).
+///
+/// ```
+/// use atomesh::{mesh::Mesh, region::closed_surface};
+///
+/// let square = vec![[0.0, 0.0], [1.0, 0.0], [1.0, 1.0], [0.0, 1.0]];
+/// let mesh = Mesh::new(square, vec![0, 1, 2, 0, 2, 3])?;
+/// assert_eq!(closed_surface(&mesh, &[7, 8], 7), [[0, 1], [2, 0], [1, 2]]);
+/// # Ok::<(), atomesh::mesh::MeshError>(())
+/// ```
+///
+/// # Panics
+/// If there are not as many labels as cells.
+pub fn closed_surface<const D: usize>(mesh: &Mesh<D>, labels: &[i32], label: i32) -> Vec<[u32; D]> {
+    assert_eq!(labels.len(), mesh.cell_count(), "one label a cell");
+    let is_in = |cell: &u32| labels[*cell as usize] == label;
+    let outward = |facet: &Facet<D>| {
+        let other = facet.neighbour.filter(is_in);
+        let inner = match (Some(facet.cell).filter(is_in), other) {
+            (Some(cell), None) | (None, Some(cell)) => cell,
+            _ => return None,
+        };
+        mesh.facet_out_of(inner, &facet.corners)
+    };
+    mesh.facets().iter().filter_map(outward).collect()
 }
 
 #[cfg(test)]
 mod tests {
+    use std::collections::BTreeMap;
+
     use super::*;
+    use crate::geometry::dot;
 
     /// Triangles of a grid of squares of one sample.
     fn squares() -> Mesh<2> {
@@ -158,19 +132,88 @@ mod tests {
         assert_eq!(interfaces(&mesh, &labels), []);
     }
 
+    /// Cubes of six tetrahedra, `n` along every axis, their labels drawn by a hash of the cell's number.
+    fn cubes(n: u32) -> (Mesh<3>, Vec<i32>) {
+        let each = n + 1;
+        let points = (0..each.pow(3))
+            .map(|i| [i % each, i / each % each, i / each / each].map(f64::from))
+            .collect();
+        let steps = [1, each, each * each];
+        let paths = [[0, 1, 2], [1, 2, 0], [2, 0, 1], [0, 2, 1], [1, 0, 2], [2, 1, 0]];
+        let mut corners = Vec::new();
+        for cube in 0..n.pow(3) {
+            let first = cube % n + each * (cube / n % n) + each * each * (cube / n / n);
+            for (at, [a, b, c]) in paths.into_iter().enumerate() {
+                let ends = [first, first + steps[a], first + steps[a] + steps[b]];
+                let last = ends[2] + steps[c];
+                // the paths of an odd order of axes are left-handed
+                let mirrored = [ends[0], ends[2], ends[1], last];
+                corners.extend(if at < 3 { [ends[0], ends[1], ends[2], last] } else { mirrored });
+            }
+        }
+        let mesh = Mesh::new(points, corners).unwrap();
+        let labels = (0..mesh.cell_count() as u32)
+            .map(|cell| (cell.wrapping_mul(2_654_435_761) >> 16) as i32 % 3)
+            .collect();
+        (mesh, labels)
+    }
+
+    /// A closed surface bounds the cells of its label: ridges are even, area vectors cancel, and by the divergence
+    /// theorem it holds as much as the cells.
+    fn check_closed<const D: usize>(mesh: &Mesh<D>, labels: &[i32]) {
+        assert_eq!(mesh.validate(), Ok(()));
+        for label in [0, 1, 2] {
+            let surface = closed_surface(mesh, labels, label);
+            let mut ridges: BTreeMap<Vec<u32>, usize> = BTreeMap::new();
+            let (mut sum, mut held) = ([0.0; D], 0.0);
+            for facet in &surface {
+                for skip in 0..D {
+                    let mut ridge = facet.to_vec();
+                    ridge.remove(skip);
+                    ridge.sort_unstable();
+                    *ridges.entry(ridge).or_default() += 1;
+                }
+                let normal = mesh.facet_normal(facet);
+                sum = std::array::from_fn(|k| sum[k] + normal[k]);
+                held += dot(&normal, &mesh.points()[facet[0] as usize]) / D as f64;
+            }
+            assert!(ridges.values().all(|count| count.is_multiple_of(2)), "label {label}");
+            // coordinates are whole, so that sums of halves are exact
+            assert_eq!(sum, [0.0; D], "label {label}");
+            let cells = mesh.simplices().zip(labels).filter(|(_, own)| **own == label);
+            let cells: f64 = cells.map(|(cell, _)| cell.measure()).sum();
+            // thirds and sixths are not: some rounding
+            assert!((held - cells).abs() < 1e-9, "label {label}: {held}, {cells}");
+            assert!(!surface.is_empty());
+        }
+        assert!(closed_surface(mesh, labels, 9).is_empty());
+    }
+
     #[test]
-    fn small_islands_join_the_neighbour_with_most_facets() {
+    fn the_surface_of_a_label_is_closed_and_holds_its_cells() {
+        let (mesh, labels) = cubes(4);
+        check_closed(&mesh, &labels);
         let mesh = squares();
-        let mut labels = halves(&mesh);
-        let calm = labels.clone();
-        labels[0] = 5;
-        labels[10] = 5;
-        assert_eq!(join_islands(&mesh, &mut labels, 1), 0);
-        assert_eq!(join_islands(&mesh, &mut labels, 2), 2);
-        assert_eq!(labels, calm);
-        // no neighbour to join
-        let mut alone = vec![4; mesh.cell_count()];
-        assert_eq!(join_islands(&mesh, &mut alone, 1000), 0);
+        let labels: Vec<i32> = (0..mesh.cell_count() as i32).map(|i| i * i % 7 % 3).collect();
+        check_closed(&mesh, &labels);
+    }
+
+    #[test]
+    fn an_interface_is_what_two_surfaces_share() {
+        let (mesh, labels) = cubes(3);
+        let sorted = |facet: &[u32; 3]| {
+            let mut facet = *facet;
+            facet.sort_unstable();
+            facet
+        };
+        let of = |label| closed_surface(&mesh, &labels, label);
+        let (lower, higher): (Vec<_>, Vec<_>) =
+            (of(0), of(1).iter().map(sorted).collect::<Vec<_>>());
+        let shared: Vec<_> =
+            lower.into_iter().filter(|facet| higher.contains(&sorted(facet))).collect();
+        let found = interfaces(&mesh, &labels);
+        // the normals of both leave label 0
+        assert_eq!(found[0], Interface { labels: [0, 1], facets: shared });
     }
 
     #[test]

@@ -4,14 +4,17 @@
 //! - [`trim_to_outline`] drops the cells outside of the outline; the boundary of what is left is a manifold.
 //! - [`smooth_outline`] moves points on and beside the outline to better places, [`fit_facets`] makes up for what facets
 //!   cut off.
-//! - [`interfaces`] lie between cells of different labels; [`join_islands`] removes small groups of cells.
+//! - [`interfaces`] lie between cells of two labels, a [`closed_surface`] bounds those of one; [`join_islands`] removes
+//!   small groups of cells. A [`ThinLayer`] of a label is too thin for the edges asked for.
 //! - [`components`] are the parts into which facets cut a mesh.
 //!
 //! Outlines come before the lattice, which grows on them; labels need only a mesh.
 
 mod adjust;
 mod components;
+mod islands;
 mod labels;
+mod layers;
 mod manifold;
 mod outline;
 mod regularity;
@@ -19,8 +22,13 @@ mod trim;
 
 pub use adjust::{fit_facets, smooth_outline};
 pub use components::components;
-pub use labels::{Interface, interfaces, join_islands, label_samples};
+pub(crate) use islands::fill_labels;
+pub use islands::join_islands;
+pub use labels::{Interface, closed_surface, interfaces, label_samples};
+pub use layers::ThinLayer;
+pub(crate) use layers::{LabelImage, thin_layers};
 pub use outline::Outline;
+pub(crate) use outline::samples_inside;
 pub(crate) use trim::free_axes;
 pub use trim::{Trimmed, outline_facets, trim_to_outline};
 

@@ -221,6 +221,11 @@ fn shift(shares: &mut [f32], whole: f64, sigma: f64) {
     }
 }
 
+/// Whether each sample of a mask is inside: not 0, or, of shares, one half or more.
+pub(crate) fn samples_inside(mask: &Samples) -> Result<Vec<bool>, RegionError> {
+    Ok(shares(mask)?.into_iter().map(|share| share >= 0.5).collect())
+}
+
 /// The share of each sample that is inside: the values, if all are within 0…1; else 1 where they are not 0.
 fn shares(samples: &Samples) -> Result<Vec<f32>, RegionError> {
     let mut values = samples.to_f32();

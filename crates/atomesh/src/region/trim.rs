@@ -278,11 +278,10 @@ fn compact<const D: usize>(
 pub fn outline_facets<const D: usize>(mesh: &Mesh<D>, bounds: &Bounds<D>) -> Vec<[u32; D]> {
     let mut found: Vec<(u32, [u32; D])> = Vec::new();
     for facet in mesh.facets().iter().filter(|facet| facet.neighbour.is_none()) {
-        let at = facet.cell as usize * (D + 1);
-        let cell = &mesh.corners()[at..at + D + 1];
-        let Some(apex) = cell.iter().position(|c| !facet.corners.contains(c)) else { continue };
-        if !is_on_side(mesh, &facet.corners, bounds) {
-            found.push((facet.cell, mesh.facet_of(facet.cell as usize, apex)));
+        if !is_on_side(mesh, &facet.corners, bounds)
+            && let Some(outward) = mesh.facet_out_of(facet.cell, &facet.corners)
+        {
+            found.push((facet.cell, outward));
         }
     }
     found.sort_unstable();

@@ -299,6 +299,22 @@ fn what_is_not_met_is_said() {
 }
 
 #[test]
+fn flat_layers_of_labels_meet_the_sides_of_the_box() {
+    // edges in a side cross a flat layer within roundings of the side, where Delaunay's predicates take no points
+    for thickness in [1.0, 4.0] {
+        let labels = image([24; 3], |p| match p[2] - 11.8 {
+            above if above.abs() < 0.5 * thickness => 1.0,
+            above => 1.0 + above.signum(),
+        });
+        let inputs = Inputs { labels: Some(&labels), ..Inputs::image(&labels) };
+        let options = conforming(3.0, Features::Labels);
+        let prepared = prepare(&Method::space(), inputs, options, &mut Silent).unwrap();
+        let outcome = prepared.run(&mut Silent).unwrap();
+        assert_eq!(outcome.mesh().validate(), Ok(()));
+    }
+}
+
+#[test]
 fn a_ball_of_labels_keeps_its_volume_and_its_interface_is_turned_one_way() {
     let (centre, radius) = ([14.3, 13.8, 14.1], 8.6);
     let grey = ball([29, 28, 29], centre, radius);

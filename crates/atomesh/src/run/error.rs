@@ -11,7 +11,7 @@ use crate::measure::MeasureError;
 use crate::mesh::ConnectError;
 use crate::mirror::MirrorError;
 use crate::optimize::OptimizeError;
-use crate::region::RegionError;
+use crate::region::{RegionError, ThinLayer};
 use crate::sample::SampleError;
 use crate::voronoi::VoronoiError;
 use crate::watch::Cancelled;
@@ -182,6 +182,18 @@ pub enum Warning {
         /// A place on the strongest of them, in world coordinates.
         place: String,
     },
+    /// Labels of the image that no cell has.
+    #[error("no cell has {} of the label image: the regions are too small for edges this long, or joined others as islands", few(labels.iter().map(|label| format!("label {label}"))))]
+    LabelsLost {
+        /// The labels, ascending.
+        labels: Vec<i32>,
+    },
+    /// Layers of labels that come out broken or smaller than they are.
+    #[error("layers of labels come out broken or smaller, since edges are longer than they are thick: {}; a nominal distance of at most the thickness keeps a layer whole", few(layers.iter().map(layer)))]
+    ThinLayers {
+        /// The layers, by ascending labels.
+        layers: Vec<ThinLayer>,
+    },
     /// d is larger than the box.
     #[error("the nominal distance {distance} exceeds the box, {extent} along {}: the mesh is as coarse as can be", ["x", "y", "z"][*axis])]
     Coarse {
@@ -192,6 +204,23 @@ pub enum Warning {
         /// The box along the axis.
         extent: f64,
     },
+}
+
+/// The most things that a warning names.
+const MOST_NAMED: usize = 4;
+
+/// The first of some things, and how many more there are.
+fn few(things: impl ExactSizeIterator<Item = String>) -> String {
+    let more = things.len().saturating_sub(MOST_NAMED);
+    let named = things.take(MOST_NAMED).collect::<Vec<_>>().join(", ");
+    if more == 0 { named } else { format!("{named} and {more} more") }
+}
+
+/// A layer in words, its thickness with as many digits as people care for.
+fn layer(layer: &ThinLayer) -> String {
+    let thickness = format!("{:.3}", layer.thickness);
+    let thickness = thickness.trim_end_matches('0').trim_end_matches('.');
+    format!("label {}, {thickness} thick", layer.label)
 }
 
 /// A number of bytes for people.

@@ -1,5 +1,7 @@
 //! The fifth stage: the mesh whose facets follow features.
 
+use std::collections::BTreeSet;
+
 use rayon::prelude::*;
 
 use crate::conform::{FeatureFacet, Unmet, feature_facets, unmet};
@@ -11,9 +13,9 @@ use crate::improve::ImproveReport;
 use crate::mesh::Mesh;
 use crate::mirror::MirrorReport;
 use crate::optimize::OptimizeReport;
-use crate::region::{join_islands, outline_facets};
+use crate::region::{LabelImage, fill_labels, join_islands, outline_facets, thin_layers};
 use crate::sample::{SampleOptions, Statistic, sample_in_frame};
-use crate::watch::Watch;
+use crate::watch::{Phase, Watch, check};
 
 use super::error::{RunError, Warning};
 use super::outcome::Outcome;
@@ -74,8 +76,8 @@ pub(super) fn finish<const D: usize>(
         Some(_) => outline_facets(&mesh, &run.bounds()),
         None => Vec::new(),
     };
-    let labels = labels.as_ref();
-    let labels = labels.map(|labels| label(&run, &mesh, labels, watch)).transpose()?;
+    let labelled = labels.as_ref().map(|labels| label(&run, &mesh, labels, watch)).transpose()?;
+    let (labels, lost) = labelled.unzip();
     let points = mesh.points().par_iter().with_min_len(1 << 10);
     let distance_at_points = points.clone().map(|p| distance.at(p) as f32).collect();
     let (low, high) = potential.range(); // a spline passes beyond it at jumps
@@ -83,7 +85,8 @@ pub(super) fn finish<const D: usize>(
     let potential_at_points = points.map(at).collect();
     let (feature_facets, not_met) = met_features(&run, &mesh);
     let followed = followed_features(&run, &mesh, watch)?;
-    let warnings = run.warnings().iter().cloned().chain(not_met).collect();
+    let found = not_met.into_iter().chain(lost.into_iter().flatten());
+    let warnings = run.warnings().iter().cloned().chain(found).collect();
     Ok(Outcome {
         run,
         mesh,
@@ -142,18 +145,41 @@ fn followed_features<const D: usize>(
     Ok(found.features.into_iter().map(of).collect())
 }
 
-/// The label of each cell.
+/// The label of each cell, and what was odd about labels.
 fn label<const D: usize>(
     run: &Prepared<D>,
     mesh: &Mesh<D>,
-    samples: &[i32],
+    samples: &Samples,
     watch: &mut dyn Watch,
-) -> Result<Vec<i32>, RunError> {
-    let frame = run.lattice_frame();
-    let samples = Samples::I32(samples.to_vec());
+) -> Result<(Vec<i32>, Vec<Warning>), RunError> {
     let statistics = SampleOptions::new(&[Statistic::Majority]);
-    let found = sample_in_frame(mesh, &frame, &samples, statistics, watch)?;
-    let mut labels: Vec<i32> = found.values[0].iter().map(|&label| label as i32).collect();
+    let found = sample_in_frame(mesh, &run.lattice_frame(), samples, statistics, watch)?;
+    // a cell at the rim of a mask may have no sample inside of it
+    let known = |label: &f64| (!label.is_nan()).then_some(*label as i32);
+    let found: Vec<Option<i32>> = found.values[0].iter().map(known).collect();
+    let covering = fill_labels(mesh, &found);
+    let mut labels = covering.clone();
     join_islands(mesh, &mut labels, run.options().least_island);
-    Ok(labels)
+    check(watch, Phase::Measure, 1.0, None)?;
+    let warnings = lost_labels(run, mesh, samples, [&covering, &labels]);
+    Ok((labels, warnings))
+}
+
+/// Warnings of labels that no cell has, and of layers too thin for the edges asked for; `covering` are the cells' labels
+/// before islands joined others, which the user asked for.
+fn lost_labels<const D: usize>(
+    run: &Prepared<D>,
+    mesh: &Mesh<D>,
+    samples: &Samples,
+    [covering, labels]: [&[i32]; 2],
+) -> Vec<Warning> {
+    let image = LabelImage { grid: &run.parts().grid, samples };
+    let measures = image.measures();
+    let present: BTreeSet<i32> = labels.iter().copied().collect();
+    let missing: Vec<i32> = measures.keys().copied().filter(|l| !present.contains(l)).collect();
+    let mut layers = thin_layers(mesh, covering, image, &measures, run.distance());
+    layers.retain(|layer| present.contains(&layer.label));
+    let missing = (!missing.is_empty()).then_some(Warning::LabelsLost { labels: missing });
+    let thin = (!layers.is_empty()).then_some(Warning::ThinLayers { layers });
+    missing.into_iter().chain(thin).collect()
 }

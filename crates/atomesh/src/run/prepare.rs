@@ -7,9 +7,9 @@ use crate::enhance::{self, FeatureOptions, Features};
 use crate::fields::{
     Fields, GRADIENT_LIMIT, Grading, ImageWeight, NominalDistance, ScalarField, default_distance,
 };
-use crate::image::{Frame, Grid, Image};
+use crate::image::{Frame, Grid, Image, Samples};
 use crate::improve::Align;
-use crate::region::{Outline, label_samples};
+use crate::region::{Outline, label_samples, samples_inside};
 use crate::watch::{Phase, Watch, check};
 
 use super::error::{RunError, Warning};
@@ -56,13 +56,7 @@ pub(super) fn prepare<const D: usize>(
     }
     method.crystal(options.lattice)?; // refuse early what does not fit the dimension
     let mut warnings = Vec::new();
-    let labels = match inputs.labels {
-        Some(labels) => {
-            same_shape("label image", &frame, labels)?;
-            Some(label_samples(labels.samples())?)
-        }
-        None => None,
-    };
+    let labels = labels(&inputs)?;
     let mut samples = potential_samples(&inputs, &options, &mut warnings, watch)?;
     check(watch, Phase::Distance, 0.0, None)?;
     let distance = nominal_distance(&inputs, &grid, &options, &samples)?;
@@ -102,6 +96,19 @@ pub(super) fn prepare<const D: usize>(
         pieces,
         crests,
     }))
+}
+
+/// The labels of the samples; NaN for those outside of the mask, which count in no cell.
+fn labels<const D: usize>(inputs: &Inputs<'_, D>) -> Result<Option<Samples>, RunError> {
+    let Some(image) = inputs.labels else { return Ok(None) };
+    same_shape("label image", inputs.image.frame(), image)?;
+    let labels = label_samples(image.samples())?;
+    let Some(mask) = inputs.mask else { return Ok(Some(Samples::I32(labels))) };
+    same_shape("mask", inputs.image.frame(), mask)?;
+    let inside = samples_inside(mask.samples())?;
+    let masked = labels.iter().zip(inside);
+    let masked = masked.map(|(&label, inside)| if inside { f64::from(label) } else { f64::NAN });
+    Ok(Some(Samples::F64(masked.collect())))
 }
 
 /// Where the mesh ends, if there is a mask and it does not hold the whole box.

@@ -7,7 +7,7 @@ use crate::conform::are_on_pieces;
 use crate::crests::{FeaturePoint, Pieces};
 use crate::fields::{Fields, FieldsView, Interpolation, NominalDistance, ScalarField};
 use crate::geometry::{Bounds, Point, compact_order};
-use crate::image::{Frame, Grid};
+use crate::image::{Frame, Grid, Samples};
 use crate::lattice::{
     GrowOptions, Lattice, Place, ScatterOptions, fill_holes, grow_within, scatter, settle,
 };
@@ -40,7 +40,8 @@ pub(super) struct Parts<const D: usize> {
     pub fields: Fields<D>,
     /// Where the mesh ends, if it does not fill the box.
     pub outline: Option<Outline<D>>,
-    pub labels: Option<Vec<i32>>,
+    /// The label of each sample; NaN outside of the mask.
+    pub labels: Option<Samples>,
     pub warnings: Vec<Warning>,
     /// The features that facets are made to keep to.
     pub pieces: Option<Pieces<D>>,

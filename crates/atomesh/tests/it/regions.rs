@@ -9,7 +9,7 @@ use atomesh::image::{Frame, Image, Samples};
 use atomesh::measure::shapes;
 use atomesh::mesh::Mesh;
 use atomesh::region::RegionError;
-use atomesh::run::{Inputs, MeshOptions, Method, Outcome, RunError, Size, prepare};
+use atomesh::run::{Inputs, MeshOptions, Method, Outcome, RunError, Size, Warning, prepare};
 use atomesh::watch::Silent;
 
 /// An image of a function of the sample's index.
@@ -263,6 +263,96 @@ fn cells_take_labels_and_interfaces_their_names() {
         .collect();
     let mean = off.iter().sum::<f64>() / off.len() as f64;
     assert!(interface.len() > 15 && mean < 0.1 * 6.0, "{} {mean}", interface.len());
+}
+
+/// A mesh of labels that are 0 exactly where the mask is, 1 on the left of its middle and 2 on the right.
+fn halved<const D: usize>(method: &Method<D>, shape: [usize; D], radii: [f64; 2], size: f64) {
+    let centre = shape.map(|n| 0.5 * n as f64 + 0.3);
+    let is_inside = |p: &Point<D>| (radii[0]..radii[1]).contains(&distance(p, &centre));
+    let labels = image(shape, |p| u8::from(is_inside(p)) * (1 + u8::from(p[0] > centre[0])));
+    let mask = image(shape, |p| u8::from(is_inside(p)));
+    for kind in [Features::None, Features::Labels] {
+        let features = FeatureOptions { features: kind, ..Default::default() };
+        let options = MeshOptions { features, ..options(size) };
+        let inputs = Inputs { mask: Some(&mask), labels: Some(&labels), ..Inputs::image(&labels) };
+        let outcome = run(method, inputs, options).unwrap();
+        let tags = outcome.tags().unwrap();
+        assert_eq!(tags.regions().unwrap().ids(), [1, 2]);
+        let left = (outcome.mesh().simplices().zip(outcome.labels().unwrap()))
+            .filter(|(_, label)| **label == 1)
+            .map(|(cell, _)| cell.measure());
+        let share = left.sum::<f64>() / outcome.mesh().measure();
+        // cells have one label each: the cut is off by a part of a cell in places
+        assert!((share - 0.5).abs() < 0.05, "{share}");
+        assert_eq!(outcome.warnings(), []);
+    }
+}
+
+#[test]
+fn cells_within_a_mask_have_labels_from_within() {
+    halved(&Method::plane(), [96, 80], [14.0, 34.0], 5.0);
+    halved(&Method::plane(), [96, 80], [14.0, 34.0], 8.0);
+    halved(&Method::space(), [48, 44, 46], [0.0, 19.0], 6.0);
+    halved(&Method::space(), [48, 44, 46], [9.0, 20.0], 5.0);
+}
+
+/// What is said of a mesh of labels in the plane.
+fn said(labels: &Image<2>, mask: Option<&Image<2>>, least_island: usize) -> Vec<Warning> {
+    let features = FeatureOptions { features: Features::Labels, ..Default::default() };
+    let options = MeshOptions { features, least_island, ..options(5.0) };
+    let inputs = Inputs { labels: Some(labels), mask, ..Inputs::image(labels) };
+    let outcome = run(&Method::plane(), inputs, options).unwrap();
+    let is_of_labels =
+        |w: &Warning| matches!(w, Warning::LabelsLost { .. } | Warning::ThinLayers { .. });
+    outcome.warnings().iter().filter(|w| is_of_labels(w)).cloned().collect()
+}
+
+#[test]
+fn labels_that_no_cell_has_are_said() {
+    let labels = image([96, 64], |p| match p {
+        [30.0, 20.0] => 9,
+        [70.0, 20.0] => 7,
+        [x, _] if *x < 50.0 => 1,
+        _ => 2,
+    });
+    assert_eq!(said(&labels, None, 0), [Warning::LabelsLost { labels: vec![7, 9] }]);
+    // outside of the mask there is nothing to lose
+    let mask = image([96, 64], |p| u8::from(p[0] < 60.0));
+    assert_eq!(said(&labels, Some(&mask), 0), [Warning::LabelsLost { labels: vec![9] }]);
+    let text = Warning::LabelsLost { labels: (0..9).collect() }.to_string();
+    assert!(text.contains("label 0, label 1, label 2, label 3 and 5 more"), "{text}");
+}
+
+#[test]
+fn layers_that_come_out_broken_are_said_with_their_thickness() {
+    let layer = |thickness: f64| {
+        image([96, 64], |p| match 0.9 * (p[1] - 32.0) + 0.4359 * (p[0] - 48.0) {
+            across if across.abs() < 0.5 * thickness => 3,
+            across => u8::from(across > 0.0),
+        })
+    };
+    let [Warning::ThinLayers { layers }] = &said(&layer(2.0), None, 0)[..] else {
+        panic!("{:?}", said(&layer(2.0), None, 0));
+    };
+    assert_eq!((layers.len(), layers[0].label), (1, 3));
+    // samples place either side to about half of one
+    assert!((layers[0].thickness - 2.0).abs() < 1.0, "{layers:?}");
+    assert_eq!(said(&layer(7.0), None, 0), []);
+}
+
+#[test]
+fn islands_that_are_to_join_others_are_not_said_unless_their_label_vanishes() {
+    let discs = |second: u8| {
+        image([96, 64], |p| {
+            let first = 5 * u8::from(distance(p, &[30.0, 32.0]) < 14.0);
+            let small = distance(p, &[72.0, 32.0]) < 7.0;
+            if small { second } else { first }
+        })
+    };
+    // the small disc is a fifth of its label, and of some twenty cells
+    assert_eq!(said(&discs(5), None, 40), []);
+    assert_eq!(said(&discs(6), None, 40), [Warning::LabelsLost { labels: vec![6] }]);
+    assert_eq!(said(&discs(6), None, 0), []);
 }
 
 #[test]

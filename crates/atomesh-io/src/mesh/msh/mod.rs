@@ -4,8 +4,9 @@
 //! so do cells, unless they have regions: then each region is an entity. Regions and groups of facets are
 //! physical groups with names; where there are groups but no regions, all cells are in one named `domain`.
 //! Physical groups have numbers above 0: regions of other numbers get the next ones, and the comment tells
-//! which. Fields at points are `$NodeData`, fields in cells `$ElementData`. The frame and the provenance are
-//! JSON in `$Comments`, a section that Gmsh ignores.
+//! which. A facet of several groups is turned as the first of them has it. Fields at points are `$NodeData`,
+//! fields in cells `$ElementData`. The frame and the provenance are JSON in `$Comments`, a section that Gmsh
+//! ignores.
 
 mod entities;
 mod read;
