@@ -16,8 +16,6 @@ mod shape;
 mod statistics;
 
 #[cfg(test)]
-mod fidelity_tests;
-#[cfg(test)]
 mod tests;
 
 pub use alignment::{AlignmentOptions, AlignmentReport, alignment, alignment_of_faces};
