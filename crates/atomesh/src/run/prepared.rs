@@ -41,9 +41,13 @@ pub(super) struct Parts<const D: usize> {
     /// Where the mesh ends, if it does not fill the box.
     pub outline: Option<Outline<D>>,
     pub labels: Option<Vec<i32>>,
+    /// Whether the image is b itself.
+    pub is_potential: bool,
     pub warnings: Vec<Warning>,
     /// The features that facets are made to keep to.
     pub pieces: Option<Pieces<D>>,
+    /// The features that faces of Voronoi cells are made to fall on.
+    pub faced: Option<Pieces<D>>,
 }
 
 impl<const D: usize> fmt::Debug for Prepared<D> {
@@ -100,6 +104,24 @@ impl<const D: usize> Prepared<D> {
     /// The features that facets are made to keep to, if any are.
     pub fn pieces(&self) -> Option<&Pieces<D>> {
         self.0.pieces.as_ref()
+    }
+
+    /// The features that faces of Voronoi cells are made to fall on, if these are clean lines or sheets.
+    pub fn faced(&self) -> Option<&Pieces<D>> {
+        self.0.faced.as_ref()
+    }
+
+    /// What kind of features was asked for: its name, those of a mixture, or `potential`.
+    pub(super) fn kind_of_features(&self) -> String {
+        let Parts { options, is_potential, .. } = &*self.0;
+        match &options.mixture {
+            _ if *is_potential => "potential".into(),
+            Some(mixture) => {
+                let names = mixture.shares().iter().map(|share| share.features.name());
+                names.collect::<Vec<_>>().join("+")
+            }
+            None => options.features.features.name().into(),
+        }
     }
 
     /// What was odd so far.
