@@ -213,11 +213,13 @@ impl<'a, const D: usize> Bins<'a, D> {
     /// Whether the disc of some feature point passes within τ.
     fn is_near(&self, p: &Point<D>) -> bool {
         let cube = self.cube(p);
+        // the point's own cube first: a disc that is near is most often there
         (0..3usize.pow(D as u32)).any(|code| {
             let mut rest = code;
             let mut other = cube;
             for k in 0..D {
-                let Some(i) = (cube[k] + rest % 3).checked_sub(1).filter(|&i| i < self.shape[k])
+                let Some(i) =
+                    (cube[k] + (rest + 1) % 3).checked_sub(1).filter(|&i| i < self.shape[k])
                 else {
                     return false;
                 };
@@ -233,8 +235,12 @@ impl<'a, const D: usize> Bins<'a, D> {
     fn passes(&self, member: usize, p: &Point<D>) -> bool {
         let point = &self.features[member];
         let v = difference(p, &point.position);
+        let squared = dot(&v, &v);
+        if squared > self.side * self.side {
+            return false;
+        }
         let across = dot(&v, &point.normal);
-        let along = (dot(&v, &v) - across * across).max(0.0).sqrt();
+        let along = (squared - across * across).max(0.0).sqrt();
         let beyond = (along - self.reach).max(0.0);
         across * across + beyond * beyond <= self.tau * self.tau
     }

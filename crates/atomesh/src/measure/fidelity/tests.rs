@@ -245,7 +245,11 @@ fn by_elimination<const D: usize>(mesh: &Mesh<D>, shape: [usize; D], samples: &S
         used.push((weight, shares, value));
     }
     // a point without samples about it
-    (0..count).filter(|&k| a[k][k] == 0.0).for_each(|k| a[k][k] = 1.0);
+    for (k, row) in a.iter_mut().enumerate().take(count) {
+        if row[k] == 0.0 {
+            row[k] = 1.0;
+        }
+    }
     assert!(crate::geometry::linear::solve(count, a, &mut b) != 0.0);
     let error = |(weight, shares, value): &(f64, Vec<(usize, f64)>, f64)| {
         let fitted: f64 = shares.iter().map(|&(point, share)| share * b[point][0]).sum();
