@@ -213,12 +213,15 @@ fn an_inverted_cell_counts_as_one_of_positive_measure() {
     assert!((first.linear_rms - second.linear_rms).abs() < 1e-9 && second.covered > 0.999);
 }
 
+/// A sample's weight, the points of its cell with its barycentric coordinates, and its value.
+type Used = (f64, Vec<(usize, f64)>, f64);
+
 /// The error of the linear fit by elimination, each sample in the first cell that has it.
 fn by_elimination<const D: usize>(mesh: &Mesh<D>, shape: [usize; D], samples: &Samples) -> f64 {
     const MOST: usize = 40;
     let count = mesh.points().len();
     let (mut a, mut b) = ([[0.0; MOST]; MOST], [[0.0; 1]; MOST]);
-    let mut used: Vec<(f64, Vec<(usize, f64)>, f64)> = Vec::new();
+    let mut used: Vec<Used> = Vec::new();
     for i in 0..samples.len() {
         let at = crate::image::coordinates(i, shape);
         let is_rim = |k: usize| at[k] == 0 || at[k] + 1 == shape[k];
@@ -251,7 +254,7 @@ fn by_elimination<const D: usize>(mesh: &Mesh<D>, shape: [usize; D], samples: &S
         }
     }
     assert!(crate::geometry::linear::solve(count, a, &mut b) != 0.0);
-    let error = |(weight, shares, value): &(f64, Vec<(usize, f64)>, f64)| {
+    let error = |(weight, shares, value): &Used| {
         let fitted: f64 = shares.iter().map(|&(point, share)| share * b[point][0]).sum();
         weight * (value - fitted).powi(2)
     };
