@@ -3,6 +3,7 @@
 use std::ops::ControlFlow;
 
 use atomesh::image::{Frame, Image, Samples};
+use atomesh::run::MeshKind;
 use atomesh::watch::{Phase, Watch};
 use atomesh_job::flow::{FlowMeshCells, FlowOptions, flow};
 use atomesh_job::mesh::{MeshImages, mesh};
@@ -109,4 +110,47 @@ fn warnings_are_notes() {
     assert!(outcome.mesh().cell_count() > 10);
     let [note] = session.notes() else { panic!("{:?}", session.notes()) };
     assert!(note.is_warning && note.text.contains("no features"), "{note}");
+}
+
+/// What flows from below to above past sealed features, and the notes.
+fn sealed_flow(image: Image<2>, size: &str, kind: MeshKind) -> (f64, Vec<String>) {
+    let mut watch = Phases::default();
+    let mut session = Session::new(&mut watch);
+    let mut run = run(size);
+    run.lattice.mesh = Some(kind);
+    let sides = ["ymin=pressure:1", "ymax=pressure:0"].map(|side| side.parse().unwrap());
+    let options = FlowOptions { side: sides.to_vec(), ..Default::default() };
+    let plane = Dimension::plane();
+    let answer = flow(&run, &options, MeshImages::new(image), &plane, &mut session).unwrap();
+    let notes = session.notes().iter().map(ToString::to_string).collect();
+    (answer.balance(&plane.flow).scale, notes)
+}
+
+#[test]
+fn a_sealed_row_lets_nothing_through_and_that_is_said() {
+    for kind in [MeshKind::Delaunay, MeshKind::Voronoi] {
+        let (scale, notes) = sealed_flow(image(), "3", kind);
+        // on Voronoi cells rounding is left
+        assert!(scale < 1e-12, "{scale} flows on {kind:?}");
+        assert!(notes.iter().any(|note| note.contains("nothing flows")), "{notes:?}");
+    }
+}
+
+#[test]
+fn what_flows_past_rows_too_near_to_each_other_is_said() {
+    // two dark lines 2 to 8 samples apart, each from edge to edge, so that nothing should pass
+    let grey = (0..96 * 80).map(|i| {
+        let [x, y] = [f64::from(i % 96), f64::from(i / 96)];
+        let off = [y - 38.0, y - 40.0 - x / 16.0];
+        let valley = off.map(|off| (-0.5 * off * off).exp());
+        (200.0 * (1.0 - valley[0].max(valley[1]))) as u8
+    });
+    let image = Image::new(Frame::new([96, 80]).unwrap(), Samples::U8(grey.collect())).unwrap();
+    for kind in [MeshKind::Delaunay, MeshKind::Voronoi] {
+        for size in ["5", "8", "12"] {
+            let (scale, notes) = sealed_flow(image.clone(), size, kind);
+            let is_said = notes.iter().any(|note| note.contains("passes a feature"));
+            assert!(scale < 1e-12 || is_said, "{scale} flows on {kind:?} at {size}: {notes:?}");
+        }
+    }
 }

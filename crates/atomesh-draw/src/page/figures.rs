@@ -1,5 +1,6 @@
 //! The figures of a report: each with its unit and what it means.
 
+use atomesh::measure::FeatureConformity;
 use atomesh::run::MeshReport;
 
 use super::text::{grouped, real};
@@ -51,6 +52,7 @@ impl From<Option<f64>> for Shown {
 /// All tables that a report fills.
 pub(super) fn tables(report: &MeshReport, dimension: usize) -> Vec<Table> {
     let mut tables = vec![shape(report, dimension), alignment(report, dimension)];
+    tables.extend(conformity(report, dimension));
     tables.extend(fidelity(report));
     tables.extend(homogeneity(report));
     tables
@@ -156,6 +158,50 @@ fn alignment(report: &MeshReport, dimension: usize) -> Table {
         ]);
     }
     Table { title: "Alignment with features", rows }
+}
+
+/// How the facets of features keep to them.
+fn conformity(report: &MeshReport, dimension: usize) -> Option<Table> {
+    let c = report.conformity.as_ref()?;
+    let unit = if dimension == 2 { "world units" } else { "world units²" };
+    let rows = vec![
+        figure(
+            "precision",
+            c.precision,
+            "1",
+            "share of the facets of features, by length or area, whose middle is within a sample of its feature",
+        ),
+        figure("distance, RMS", c.distance.rms, "samples", "from the facets of features to these"),
+        figure("distance, 95 %", c.distance.p95, "samples", "one place in twenty is farther"),
+        figure("distance, RMS", c.distance.rms_world, "world units", "the same in the world"),
+        figure("facets", c.measure, unit, "length or area of the facets of features"),
+        figure("not met", c.not_met, unit, "length or area of features without a facet, estimated"),
+        figure("not met, share", c.not_met_share, "1", "the same over that of all features"),
+        figure("cells cut", c.cells_cut, "", "cells that a feature passes through"),
+    ];
+    Some(Table { title: "Features that the mesh keeps to", rows })
+}
+
+/// The most features that a page lists.
+const MOST_FEATURES: usize = 40;
+
+/// The names of the columns that list features, and a row for each of the first ones.
+pub(super) fn feature_rows(
+    report: &MeshReport,
+    dimension: usize,
+) -> (Vec<String>, Vec<Vec<String>>) {
+    let measure = if dimension == 2 { "length" } else { "area" };
+    let columns = ["feature", "kind", "strength", "facets", measure, "not met", "RMS", "95 %"];
+    let row = |(number, f): (usize, &FeatureConformity)| {
+        let name = f.name.clone().unwrap_or_else(|| format!("({})", number + 1));
+        let share = Shown::from(f.not_met_share).0;
+        let [rms, p95] = [f.distance.rms, f.distance.p95].map(|x| Shown::from(x).0);
+        let strength = Shown::from(f.strength).0;
+        let (facets, measure) = (Shown::from(f.facets).0, Shown::from(f.measure).0);
+        vec![name, f.kind.clone(), strength, facets, measure, share, rms, p95]
+    };
+    let rows = report.features.iter().enumerate().take(MOST_FEATURES).map(row).collect();
+    (columns.map(String::from).to_vec(), rows)
 }
 
 fn fidelity(report: &MeshReport) -> Option<Table> {

@@ -71,6 +71,7 @@ impl ReportPage<'_> {
         for table in figures::tables(self.report, self.dimension) {
             figure_table(&mut out, &table);
         }
+        self.feature_table(&mut out);
         for (title, rows) in self.tables.iter().filter(|(_, rows)| !rows.is_empty()) {
             let _ = writeln!(out, "<h2>{}</h2>\n<table>", escape(title));
             for (name, value) in rows {
@@ -94,10 +95,12 @@ impl ReportPage<'_> {
             (format!("{}°", real(shape.angle_min)), angle),
         ];
         let selected = alignment.selected.as_ref();
+        let conformity = self.report.conformity.as_ref();
         let fidelity = self.report.fidelity.as_ref();
         for (value, name) in [
             (alignment.recall, "recall of features"),
             (selected.and_then(|s| s.precision), "precision"),
+            (conformity.map(|c| c.not_met_share), "of features not met"),
             (fidelity.and_then(|f| f.linear_relative), "linear error / deviation"),
             (self.report.homogeneity.as_ref().map(|h| h.mean), "homogeneity"),
         ] {
@@ -108,6 +111,30 @@ impl ReportPage<'_> {
             let _ = writeln!(out, "<div><b>{value}</b><span>{name}</span></div>");
         }
         out.push_str("</div>\n");
+    }
+
+    /// The first features that the mesh keeps to, largest first.
+    fn feature_table(&self, out: &mut String) {
+        let (columns, rows) = figures::feature_rows(self.report, self.dimension);
+        if rows.is_empty() {
+            return;
+        }
+        let count = self.report.features.len();
+        let first =
+            if rows.len() < count { format!(", the first {}", rows.len()) } else { String::new() };
+        let _ = writeln!(out, "<h2>Features: {count}{first}</h2>\n<table>\n<tr>");
+        for name in columns {
+            let _ = writeln!(out, "<th>{}</th>", escape(&name));
+        }
+        out.push_str("</tr>\n");
+        for row in rows {
+            out.push_str("<tr>");
+            for cell in row {
+                let _ = write!(out, "<td>{}</td>", escape(&cell));
+            }
+            out.push_str("</tr>\n");
+        }
+        out.push_str("</table>\n");
     }
 
     fn charts(&self, out: &mut String) {

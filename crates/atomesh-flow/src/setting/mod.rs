@@ -31,12 +31,26 @@ pub struct Compartment {
     pub scale: f64,
     /// Whether a well or boundary fixes a pressure. If not, the pressure is known up to a constant.
     pub has_pressure: bool,
+    /// The least and the greatest of these pressures; infinite, the greater first, if there are none.
+    pub pressures: [f64; 2],
 }
 
 impl Compartment {
     fn add(&mut self, rate: f64) {
         self.rate += rate;
         self.scale += rate.abs();
+    }
+
+    fn fix(&mut self, pressure: f64) {
+        self.has_pressure = true;
+        let [least, greatest] = self.pressures;
+        self.pressures = [least.min(pressure), greatest.max(pressure)];
+    }
+
+    /// Whether anything drives flow in it: a rate, or pressures that differ. Without, the pressure is the same all over it,
+    /// and what schemes find to flow is rounding.
+    pub fn is_driven(&self) -> bool {
+        self.scale > 0.0 || self.pressures[0] < self.pressures[1]
     }
 
     fn is_balanced(&self) -> bool {
@@ -129,6 +143,11 @@ impl<'a, const D: usize> Setting<'a, D> {
         &self.compartments
     }
 
+    /// Whether anything flows: a compartment has a rate, or pressures that differ.
+    pub fn is_driven(&self) -> bool {
+        self.compartments.iter().any(Compartment::is_driven)
+    }
+
     /// The compartments whose pressure nothing fixes, each with the cell whose mean pressure schemes set to 0.
     pub fn pinned(&self) -> impl Iterator<Item = (usize, u32)> + '_ {
         let all = self.compartments.iter().enumerate();
@@ -154,6 +173,7 @@ impl<'a, const D: usize> Setting<'a, D> {
             rate: 0.0,
             scale: 0.0,
             has_pressure: false,
+            pressures: [f64::INFINITY, f64::NEG_INFINITY],
         };
         let mut all = vec![none; count];
         for (cell, &number) in self.compartment_of.iter().enumerate() {
@@ -166,7 +186,7 @@ impl<'a, const D: usize> Setting<'a, D> {
         for (number, facet) in grid.facets().iter().enumerate() {
             let own = &mut all[self.compartment_of[facet.cell as usize] as usize];
             match self.condition(number) {
-                Some(Condition::Pressure(_)) => own.has_pressure = true,
+                Some(Condition::Pressure(value)) => own.fix(value.at(&facet.centroid)),
                 Some(Condition::Flux(value)) => {
                     own.add(facet_integral(grid, number, &value));
                 }
@@ -177,7 +197,7 @@ impl<'a, const D: usize> Setting<'a, D> {
             let own = &mut all[self.compartment_of[placed.cells[0] as usize] as usize];
             match self.problem.wells[placed.well].control {
                 Control::Rate(rate) => own.add(rate),
-                Control::Pressure(_) => own.has_pressure = true,
+                Control::Pressure(pressure) => own.fix(pressure),
             }
         }
         all

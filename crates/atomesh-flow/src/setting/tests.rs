@@ -36,6 +36,23 @@ fn sealed_barriers_part_the_grid() {
 }
 
 #[test]
+fn nothing_is_driven_where_barriers_part_pressures_that_differ() {
+    let fixed = |group: &str, pressure| Boundary {
+        group: group.to_string(),
+        condition: Condition::Pressure(Value::Constant(pressure)),
+    };
+    let is_driven = |right: f64, barriers, wells| {
+        let boundaries = vec![fixed("xmin", 1.0), fixed("xmax", right)];
+        let problem = Problem { boundaries, barriers, wells, ..Problem::default() };
+        Setting::new(&problem, &strip()).unwrap().is_driven()
+    };
+    assert!(is_driven(0.0, Vec::new(), Vec::new()));
+    assert!(!is_driven(1.0, Vec::new(), Vec::new()));
+    assert!(!is_driven(0.0, sealed(), Vec::new()));
+    assert!(is_driven(0.0, sealed(), vec![well("source", 0.1, 1.0)]));
+}
+
+#[test]
 fn a_compartment_whose_rates_do_not_balance_is_named() {
     let wells = vec![well("source", 0.1, 1.0), well("sink", 0.9, -1.0)];
     let open = Problem { wells: wells.clone(), ..Problem::default() };

@@ -5,6 +5,7 @@ use atomesh_flow::{Balance, FlowGrid, FlowMethod, Problem, Setting, Solution};
 use serde_json::{Value, json};
 
 use super::flow_mesh::FlowMesh;
+use super::leak::Leak;
 use crate::session::Session;
 
 /// What flows in a mesh, with all that it was computed from.
@@ -24,6 +25,8 @@ pub struct FlowAnswer<const D: usize> {
     pub galerkin: Option<DgSolution<D>>,
     /// The share of the volume that the fluid fills.
     pub porosity: f64,
+    /// What flows across features where they have no facets, if they are barriers and something does.
+    pub leak: Option<Leak>,
 }
 
 impl<const D: usize> FlowAnswer<D> {
@@ -79,6 +82,7 @@ impl<const D: usize> FlowAnswer<D> {
             "balance": balance,
             "relative_error": balance.relative_error(),
             "leak": self.solution.leak(&self.grid, setting),
+            "not_met": self.leak,
             "compartments": compartments,
             "pinned": self.solution.pinned,
             "barriers": barriers,

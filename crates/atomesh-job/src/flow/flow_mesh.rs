@@ -5,7 +5,7 @@ use std::path::Path;
 use atomesh::features::{FeatureFaces, FeatureFacetOptions};
 use atomesh::image::{Frame, Image, Units};
 use atomesh::mesh::{Mesh, PolyMesh, Tags};
-use atomesh::run::{Outcome, Prepared, Tools};
+use atomesh::run::{AcrossFeature, Outcome, Prepared, Tools};
 use atomesh_flow::{FlowGrid, FlowMethod};
 use atomesh_io::mesh::cells::{AnyCells, CellReadError, LoadedCells, read_cells};
 use atomesh_io::mesh::{AnyMesh, LoadedMesh, OwnedField, Provenance};
@@ -15,7 +15,7 @@ use super::problem::place;
 use crate::error::JobError;
 use crate::files::has_extension;
 use crate::images::is_z_up;
-use crate::mesh::meshed;
+use crate::mesh::{meshed, refusal};
 use crate::mesh_file;
 use crate::options::RunConfig;
 use crate::session::Session;
@@ -56,6 +56,8 @@ pub struct FlowMesh<const D: usize> {
     pub units: Units,
     /// Whether z grows upwards in pictures.
     pub z_up: bool,
+    /// Facets that pass a feature which is a barrier; none of a mesh as read.
+    pub across: Vec<AcrossFeature<D>>,
 }
 
 /// A mesh as read, whose dimension the file decides.
@@ -109,6 +111,7 @@ impl<const D: usize> FlowMesh<D> {
             provenance: Some(provenance),
             units: Units::Physical,
             z_up: false,
+            across: Vec::new(),
         }
     }
 
@@ -134,6 +137,7 @@ impl<const D: usize> FlowMesh<D> {
             provenance,
             units: Units::Physical,
             z_up: false,
+            across: Vec::new(),
         })
     }
 
@@ -149,6 +153,10 @@ impl<const D: usize> FlowMesh<D> {
     ) -> Result<Self, JobError> {
         check_wells(run, flow, &prepared)?;
         let outcome = meshed(run, prepared, session)?;
+        let across = match flow.multiplier < 1.0 {
+            true => outcome.across_features(session).map_err(|e| refusal(run, e))?,
+            false => Vec::new(),
+        };
         let cells = match outcome.world_cells() {
             Some(cells) => {
                 let features = outcome.cell_features_from(-flow.below).unwrap_or_default();
@@ -169,6 +177,7 @@ impl<const D: usize> FlowMesh<D> {
             provenance: Some(run.provenance::<D>()),
             units: outcome.units(),
             z_up: is_z_up(run.input.shown(), outcome.frame()),
+            across,
         })
     }
 

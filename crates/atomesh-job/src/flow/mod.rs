@@ -6,6 +6,7 @@
 mod answer;
 mod files;
 mod flow_mesh;
+mod leak;
 mod options;
 mod permeability;
 mod picture;
@@ -14,13 +15,14 @@ mod write;
 
 pub use answer::FlowAnswer;
 pub use flow_mesh::{FlowMesh, FlowMeshCells};
+pub use leak::Leak;
 pub use options::{FlowOptions, FlowOutputOptions};
 
 use std::path::PathBuf;
 
 use atomesh::image::Image;
 use atomesh_flow::dg::{self, Form};
-use atomesh_flow::{Balance, WellFlow};
+use atomesh_flow::{Balance, Setting, Solution, WellFlow};
 use atomesh_io::image::{AnyImage, ImageFormat};
 use atomesh_io::mesh::MeshFormat;
 
@@ -37,6 +39,7 @@ use crate::session::Session;
 use crate::values::Numbers;
 use files::FlowFiles;
 use flow_mesh::AnyFlowMesh;
+use leak::leak;
 use write::FlowWriting;
 
 /// Meshes images, with wells as atoms and facets along features as barriers, and computes what flows.
@@ -101,13 +104,36 @@ pub fn flow_on<const D: usize>(
             (answer.solution.clone(), Some(answer))
         }
     };
-    if (method.balance)(&solution, &grid).scale == 0.0 {
-        let text = "nothing flows: barriers part all that drives it, or it is the same everywhere";
-        session.warn(None, text);
-    }
+    let leak = said(&mesh, &setting, &solution, (method.balance)(&solution, &grid).scale, session);
     let velocities = (method.velocities)(&solution, &grid);
     let porosity = options.porosity;
-    Ok(FlowAnswer { mesh, grid, problem, solution, velocities, galerkin, porosity })
+    Ok(FlowAnswer { mesh, grid, problem, solution, velocities, galerkin, porosity, leak })
+}
+
+/// Says if nothing flows, or if something flows past barriers; gives the latter. `scale` is all that flows.
+fn said<const D: usize>(
+    mesh: &FlowMesh<D>,
+    setting: &Setting<'_, D>,
+    solution: &Solution<D>,
+    scale: f64,
+    session: &mut Session<'_>,
+) -> Option<Leak> {
+    if !setting.is_driven() || scale == 0.0 {
+        let text = "nothing flows: barriers part all that drives it, or it is the same everywhere";
+        session.warn(None, text);
+        return None;
+    }
+    let found = leak(&mesh.across, &solution.fluxes, setting.multipliers(), scale)?;
+    let place: Vec<String> = found.place.iter().map(|x| format!("{x:.6}")).collect();
+    let place = place.iter().map(|x| x.trim_end_matches('0').trim_end_matches('.'));
+    let text = format!(
+        "{:.1} % of what flows passes a feature where no facets lie on it, most near {}: shorter edges (--size) \
+         leave less open",
+        100.0 * found.share,
+        place.collect::<Vec<_>>().join(",")
+    );
+    session.warn(None, text);
+    Some(found)
 }
 
 /// Everything that decides a run from file to file.

@@ -137,6 +137,8 @@ impl Figures {
             },
             "shape": shape,
             "alignment": alignment,
+            "features": report.map(|r| &r.features),
+            "conformity": report.map(|r| &r.conformity),
             "spread": report.map(|r| &r.spread),
             "fidelity": report.map(|r| &r.fidelity),
             "optimizer": outcome.optimize_report(),

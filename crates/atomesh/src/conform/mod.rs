@@ -15,6 +15,7 @@
 
 mod atoms;
 mod curves;
+mod cut;
 mod facets;
 mod recover;
 mod trace;
@@ -33,6 +34,7 @@ use crate::optimize::{OptimizeError, OptimizeOptions, OptimizeReport, optimize};
 use crate::watch::{Cancelled, Phase, Watch, check};
 
 use atoms::{FeatureAtom, feature_atoms};
+pub use cut::cut_cells;
 pub(crate) use facets::are_on_pieces;
 pub use facets::{FeatureFacet, feature_facets};
 use recover::{Heights, brought_near, crossings, recovered};

@@ -46,7 +46,7 @@ pub(super) struct Heights<const D: usize>(HashMap<[u64; D], Vec<(u32, f64)>>);
 
 impl<const D: usize> Heights<D> {
     /// The piece and the signed distance for each piece near each point.
-    fn of(
+    pub(super) fn of(
         &mut self,
         points: &[Point<D>],
         pieces: &Pieces<D>,
@@ -112,7 +112,7 @@ fn is_between(a: &[(u32, f64)], b: &[(u32, f64)], on: f64) -> Option<(u32, [f64;
 }
 
 /// Where the line between two points on the two sides of a piece meets it, by false position; `None` beyond its end.
-fn crossing_place<const D: usize>(
+pub(super) fn crossing_place<const D: usize>(
     [a, b]: [&Point<D>; 2],
     heights: [f64; 2],
     piece: u32,

@@ -20,6 +20,8 @@ pub struct Unmet<const D: usize> {
     pub share: f64,
     /// The places, those of the strongest piece first.
     pub places: Vec<Point<D>>,
+    /// The piece of each place.
+    pub of_places: Vec<u32>,
 }
 
 /// The places on pieces that have no facet of their own near, in lattice coordinates.
@@ -48,8 +50,7 @@ pub fn unmet<const D: usize>(
     let unmet = all.par_iter().with_min_len(1 << 8).filter(|(place, piece)| !is_met(place, *piece));
     let mut unmet: Vec<(Point<D>, u32)> = unmet.copied().collect();
     unmet.sort_by_key(|(_, piece)| *piece); // stable
-    Unmet {
-        share: unmet.len() as f64 / all.len().max(1) as f64,
-        places: unmet.into_iter().map(|(place, _)| place).collect(),
-    }
+    let share = unmet.len() as f64 / all.len().max(1) as f64;
+    let (places, of_places) = unmet.into_iter().unzip();
+    Unmet { share, places, of_places }
 }

@@ -1,8 +1,14 @@
 //! The faces of polygons and polyhedra that lie on features of the image.
+//!
+//! Where features are known as pieces of crests ([`faces_of_pieces`]), those of a piece are the faces between cells whose
+//! centres lie on its two sides: a sheet that ends only where the piece does. Else they are those along which |b| is
+//! large ([`feature_faces`]).
 
 use rayon::prelude::*;
 
-use crate::fields::ScalarField;
+use super::across::{Between, across};
+use crate::crests::Pieces;
+use crate::fields::{NominalDistance, ScalarField};
 use crate::geometry::{Point, Sets, difference, dot};
 use crate::mesh::{PolyMesh, area_vector};
 
@@ -64,6 +70,53 @@ pub fn feature_faces<const D: usize>(
     }
     let areas = roots.iter().map(|&root| area_of[root]).collect();
     FeatureFaces { of_faces, strengths, areas }
+}
+
+/// The faces between two cells.
+pub fn between_cells<const D: usize>(mesh: &PolyMesh<D>) -> Vec<Between<D>> {
+    let of = |face: usize| Between {
+        cells: [mesh.owners()[face], mesh.neighbours()[face]],
+        middle: mesh.face_centroid(face),
+    };
+    (0..mesh.inner_face_count()).map(of).collect()
+}
+
+/// Finds the faces inside the box between cells whose centres lie on two sides of a piece, within the piece.
+///
+/// Each piece is a feature; a face of several is the strongest's. `potential` serves for [`FeatureFaces::strengths`]
+/// alone. Mesh and pieces are in lattice coordinates.
+pub fn faces_of_pieces<const D: usize>(
+    mesh: &PolyMesh<D>,
+    pieces: &Pieces<D>,
+    distance: &NominalDistance<D>,
+    potential: &ScalarField<D>,
+) -> FeatureFaces {
+    let facets = between_cells(mesh);
+    let of_faces = across(mesh.centers(), &facets, pieces, distance);
+    let of_faces: Vec<Option<u32>> =
+        of_faces.into_iter().map(|across| across.map(|across| across.piece)).collect();
+    let step = potential.grid().least_step();
+    let faces = (0..mesh.inner_face_count()).into_par_iter().with_min_len(BLOCK);
+    let strengths = faces.map(|face| strength(mesh, potential, face, [0.0; D], step) as f32);
+    let mut area_of = vec![0.0; pieces.len()];
+    for (face, piece) in of_faces.iter().enumerate() {
+        let vector = mesh.area_vector(face);
+        if let Some(piece) = piece {
+            area_of[*piece as usize] += dot(&vector, &vector).sqrt();
+        }
+    }
+    let mut order: Vec<usize> = (0..pieces.len()).filter(|&piece| area_of[piece] > 0.0).collect();
+    order.sort_by(|&a, &b| area_of[b].total_cmp(&area_of[a])); // stable
+    let mut number = vec![0; pieces.len()];
+    order.iter().zip(1..).for_each(|(&piece, n)| number[piece] = n);
+    let mut numbers: Vec<u32> =
+        of_faces.iter().map(|piece| piece.map_or(0, |piece| number[piece as usize])).collect();
+    numbers.resize(mesh.face_count(), 0);
+    FeatureFaces {
+        of_faces: numbers,
+        strengths: strengths.collect(),
+        areas: order.into_iter().map(|piece| area_of[piece]).collect(),
+    }
 }
 
 /// The chosen faces in sets that share edges, each by its place among them.

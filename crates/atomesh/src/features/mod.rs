@@ -6,10 +6,12 @@
 //! ([`FeatureSet::of_facets`]).
 //!
 //! Where pieces meet they share the mesh's points. In the plane a piece is a polyline, its facets one after another; in
-//! space it is a surface. [`feature_faces`] finds the faces of polygons and polyhedra that lie on features. Cost:
+//! space it is a surface. [`faces_of_pieces`] and [`feature_faces`] find the faces of polygons and polyhedra that lie on
+//! features. Cost:
 //! reading b, O(facets) with some 10 to 100 samples each; the rest O(n log n) in chosen facets. Assumes a valid mesh.
 //! The result is the same at any thread count.
 
+mod across;
 mod clean;
 mod faces;
 mod field;
@@ -22,7 +24,8 @@ use crate::geometry::{Bounds, dot};
 use crate::mesh::{FacetGroup, Mesh, Regions, Tags, TagsError, feature_name};
 use crate::region::{components, join_islands};
 use crate::watch::Cancelled;
-pub use faces::{FeatureFaces, feature_faces};
+pub use across::{Across, Between, across, is_at_end};
+pub use faces::{FeatureFaces, between_cells, faces_of_pieces, feature_faces};
 pub use field::FacetField;
 use orient::{Oriented, Piece};
 use ridges::Ridges;

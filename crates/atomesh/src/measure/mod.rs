@@ -1,12 +1,14 @@
 //! How good a mesh is: the shape of its cells, how well its facets follow the image, how well its cells carry it.
 //!
 //! Shape needs the mesh alone. Alignment compares it with *features*, the valleys of a potential
-//! b(x), found with sub-sample accuracy. Fidelity rebuilds the image from the mesh. All give reports, plain numbers for
-//! people and for JSON, and change nothing. All of it is the same code in 2-D and 3-D.
+//! b(x), found with sub-sample accuracy; conformity compares the facets of each feature with the feature that they were
+//! made to keep to. Fidelity rebuilds the image from the mesh. All give reports, plain numbers for people and for JSON,
+//! and change nothing. All of it is the same code in 2-D and 3-D.
 
 mod alignment;
 mod angles;
 mod cell_shape;
+mod conformity;
 mod faces;
 mod features;
 mod fidelity;
@@ -16,13 +18,15 @@ mod shape;
 mod statistics;
 
 #[cfg(test)]
-mod fidelity_tests;
-#[cfg(test)]
 mod tests;
 
 pub use alignment::{AlignmentOptions, AlignmentReport, alignment, alignment_of_faces};
 pub use angles::{SpreadReport, WantedSize, spread};
 pub use cell_shape::{CellShape, cell_shape};
+pub use conformity::{
+    Conforming, Conformity, ConformityReport, CrestDistance, FeatureConformity, NotMetPlace,
+    conformity,
+};
 pub use features::{SampledPotential, features};
 pub use fidelity::{FidelityReport, HomogeneityReport, fidelity, homogeneity};
 pub use precision::{PrecisionOptions, PrecisionReport, precision};

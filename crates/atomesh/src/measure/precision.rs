@@ -77,9 +77,9 @@ pub fn precision<const D: usize>(
     // the selected length or area, and the part of it near features, facet by facet
     let found: Vec<Option<[f64; 2]>> = facets
         .par_iter()
-        .map(|facet| {
+        .map_init(Vec::new, |points, facet| {
             let corners = facet.map(|c| mesh.points()[c as usize]);
-            let points = spread_over(&corners);
+            spread_over(&corners, points);
             let count = points.len() as f64;
             let mean = points.iter().map(|p| linear(potential, p)).sum::<f64>() / count;
             (mean <= threshold).then(|| {
@@ -98,9 +98,10 @@ pub fn precision<const D: usize>(
     })
 }
 
-/// Points spread evenly over a facet: the centroids of the upright ones of n^(D−1) equal parts. With n parts an
+/// Spreads points evenly over a facet: the centroids of the upright ones of n^(D−1) equal parts. With n parts an
 /// edge, their barycentric coordinates are (i_k + 1/D)/n for all whole i_k that sum to n − 1.
-fn spread_over<const D: usize>(corners: &[Point<D>; D]) -> Vec<Point<D>> {
+fn spread_over<const D: usize>(corners: &[Point<D>; D], points: &mut Vec<Point<D>>) {
+    points.clear();
     let mut longest = 0.0_f64;
     for (i, a) in corners.iter().enumerate() {
         for b in &corners[..i] {
@@ -110,21 +111,20 @@ fn spread_over<const D: usize>(corners: &[Point<D>; D]) -> Vec<Point<D>> {
     }
     let parts_per_sample = if D == 2 { 2.0 } else { 1.0 };
     let parts = ((parts_per_sample * longest).ceil() as usize).clamp(1, MOST_PARTS);
-    let mut points = Vec::new();
-    for code in 0..parts.pow(D as u32 - 1) {
-        let mut rest = code;
-        let mut counts: [usize; D] = std::array::from_fn(|_| {
-            let count = rest % parts;
-            rest /= parts;
-            count
-        });
-        let used: usize = counts[..D - 1].iter().sum();
-        let Some(left) = (parts - 1).checked_sub(used) else { continue };
-        counts[D - 1] = left;
-        let share = counts.map(|i| (i as f64 + 1.0 / D as f64) / parts as f64);
-        points.push(std::array::from_fn(|k| (0..D).map(|c| share[c] * corners[c][k]).sum()));
+    let share = |count: usize| (count as f64 + 1.0 / D as f64) / parts as f64;
+    let last = D - 1;
+    // along the last corner but one, and in space along the one before it
+    let rows = if D == 2 { 1 } else { parts };
+    for row in 0..rows {
+        let across = if D == 2 { 0.0 } else { share(row) };
+        for i in 0..parts - row {
+            let (first, rest) = (share(i), share(parts - 1 - row - i));
+            points.push(std::array::from_fn(|k| {
+                let sum = first * corners[0][k] + rest * corners[last][k];
+                if D == 2 { sum } else { sum + across * corners[last - 1][k] }
+            }));
+        }
     }
-    points
 }
 
 /// The length of an edge or the area of a triangle.
@@ -213,11 +213,13 @@ impl<'a, const D: usize> Bins<'a, D> {
     /// Whether the disc of some feature point passes within τ.
     fn is_near(&self, p: &Point<D>) -> bool {
         let cube = self.cube(p);
+        // the point's own cube first: a disc that is near is most often there
         (0..3usize.pow(D as u32)).any(|code| {
             let mut rest = code;
             let mut other = cube;
             for k in 0..D {
-                let Some(i) = (cube[k] + rest % 3).checked_sub(1).filter(|&i| i < self.shape[k])
+                let Some(i) =
+                    (cube[k] + (rest + 1) % 3).checked_sub(1).filter(|&i| i < self.shape[k])
                 else {
                     return false;
                 };
@@ -233,8 +235,12 @@ impl<'a, const D: usize> Bins<'a, D> {
     fn passes(&self, member: usize, p: &Point<D>) -> bool {
         let point = &self.features[member];
         let v = difference(p, &point.position);
+        let squared = dot(&v, &v);
+        if squared > self.side * self.side {
+            return false;
+        }
         let across = dot(&v, &point.normal);
-        let along = (dot(&v, &v) - across * across).max(0.0).sqrt();
+        let along = (squared - across * across).max(0.0).sqrt();
         let beyond = (along - self.reach).max(0.0);
         across * across + beyond * beyond <= self.tau * self.tau
     }
@@ -248,13 +254,16 @@ mod tests {
     #[test]
     fn points_are_spread_evenly_and_their_mean_is_the_centroid() {
         let triangle = [[0.0, 0.0, 0.0], [3.0, 0.0, 1.0], [0.0, 2.0, 0.0]];
-        let points = spread_over(&triangle);
+        let mut points = Vec::new();
+        spread_over(&triangle, &mut points);
         assert_eq!(points.len(), 10); // four parts of the edge of 3.7
         for k in 0..3 {
             let mean = points.iter().map(|p| p[k]).sum::<f64>() / 10.0;
             assert!((mean - triangle.iter().map(|c| c[k]).sum::<f64>() / 3.0).abs() < 1e-14);
         }
-        assert_eq!(spread_over(&[[0.0, 0.0], [1.0, 0.0]]), [[0.75, 0.0], [0.25, 0.0]]);
+        let mut points = Vec::new();
+        spread_over(&[[0.0, 0.0], [1.0, 0.0]], &mut points);
+        assert_eq!(points, [[0.75, 0.0], [0.25, 0.0]]);
         assert!((measure(&triangle) - 0.5 * 40f64.sqrt()).abs() < 1e-14);
     }
 

@@ -9,6 +9,7 @@ use crate::measure::FidelityReport;
 use crate::mesh::{Mesh, PolyMesh, Quadratic, Tags, TagsError};
 use crate::watch::Watch;
 
+use super::across::{self, AcrossFeature};
 use super::connected::{self, Connected};
 use super::divided::{self, Divided};
 use super::error::RunError;
@@ -54,6 +55,7 @@ pub(super) struct Stages<const D: usize> {
     pub sample_cells: fn(&Outcome<D>) -> Option<PolyMesh<D>>,
     pub distance_at_samples: fn(&Outcome<D>) -> Vec<f32>,
     pub cell_features: fn(&Outcome<D>, f64) -> Option<FeatureFaces>,
+    pub across_features: fn(&Outcome<D>, &mut dyn Watch) -> Made<Vec<AcrossFeature<D>>>,
     pub feature_density: fn(&Outcome<D>) -> Vec<f32>,
     pub tags: fn(&Outcome<D>) -> Result<Tags<D>, TagsError>,
     pub quadratic: fn(&Outcome<D>) -> Quadratic<D>,
@@ -80,6 +82,7 @@ impl<const D: usize> Stages<D> {
             sample_cells: outcome::sample_cells_of,
             distance_at_samples: outcome::distance_at_samples_of,
             cell_features: outcome::cell_features_of,
+            across_features: across::across_features,
             feature_density: outcome::feature_density_of,
             tags: outcome::tags_of,
             quadratic: outcome::quadratic_of,

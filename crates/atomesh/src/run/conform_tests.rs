@@ -315,6 +315,63 @@ fn flat_layers_of_labels_meet_the_sides_of_the_box() {
 }
 
 #[test]
+fn a_report_lists_features_as_tags_name_them_and_says_how_facets_keep_to_them() {
+    let outcome = run(&Method::plane(), &cross(), conforming(7.0, Features::Dark));
+    let report = outcome.report(&mut Silent).unwrap();
+    let all = report.conformity.unwrap();
+    let tags = outcome.tags().unwrap();
+    assert_eq!(report.features.len(), 2);
+    for feature in &report.features {
+        let group = tags.facet_group(feature.name.as_deref().unwrap()).unwrap();
+        assert_eq!((feature.facets, feature.kind.as_str()), (group.facets.len(), "dark"));
+        let lengths = group.facets.iter().map(|facet| {
+            let normal = outcome.world_mesh().facet_normal(facet);
+            normal[0].hypot(normal[1])
+        });
+        assert!((feature.measure - lengths.sum::<f64>()).abs() < 1e-9);
+        // straight lines, known to within some hundredths of a sample
+        assert!(feature.distance.rms.unwrap() < 0.1 && feature.not_met_share < 0.03, "{feature:?}");
+    }
+    assert_eq!(all.precision, Some(1.0));
+    assert!(all.distance.p95 <= Some(0.3) && all.cells_cut == 0, "{all:?}");
+    assert!(all.measure > 140.0, "two lines across a box of 79 by 71");
+}
+
+#[test]
+fn a_report_counts_the_cells_that_features_cut_and_the_places_not_met() {
+    // a band whose sides are 5 apart: nearer than two thirds of d, so that one has facets and the other cuts cells
+    let image = image([60, 50], |p| {
+        let side = |at: f64| ((p[1] - at) / 1.2).tanh();
+        0.5 * (side(22.1) - side(27.1))
+    });
+    let outcome = run(&Method::plane(), &image, conforming(14.0, Features::Edges));
+    let report = outcome.report(&mut Silent).unwrap();
+    let all = report.conformity.unwrap();
+    assert_eq!(report.features.len(), 2);
+    // each side is half of all, 59 long; places are known to 10 %
+    assert!((0.3..0.7).contains(&all.not_met_share), "{all:?}");
+    let not_met: f64 = report.features.iter().map(|feature| feature.not_met).sum();
+    assert!((all.not_met - not_met).abs() < 1e-9 && (30.0..80.0).contains(&not_met), "{not_met}");
+    assert!(all.cells_cut > 0 && !all.not_met_places.is_empty());
+    for place in &all.not_met_places {
+        let y = place.place[1];
+        assert!((y - 22.1).abs().min((y - 27.1).abs()) < 0.5, "{place:?}");
+        // 5 apart, two thirds of the d that would do
+        let needed = place.distance_needed.unwrap();
+        assert!((needed - 7.5).abs() < 0.6, "{place:?}");
+    }
+}
+
+#[test]
+fn a_mesh_that_does_not_conform_has_no_report_on_that() {
+    let image = image([30, 24], |_| 7.0);
+    let report =
+        run(&Method::plane(), &image, conforming(5.0, Features::Edges)).report(&mut Silent);
+    let report = report.unwrap();
+    assert!(report.features.is_empty() && report.conformity.is_none());
+}
+
+#[test]
 fn a_ball_of_labels_keeps_its_volume_and_its_interface_is_turned_one_way() {
     let (centre, radius) = ([14.3, 13.8, 14.1], 8.6);
     let grey = ball([29, 28, 29], centre, radius);

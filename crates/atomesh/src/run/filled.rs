@@ -57,9 +57,11 @@ pub(super) fn settle<const D: usize>(
     let Filled { run, lattice } = filled;
     let Parts { method, options, .. } = run.parts();
     let options = &options.optimize;
-    let crests = match run.pairs_atoms() {
-        true => repelling_crests(run.fields(), watch)?,
-        false => Vec::new(),
+    let is_pulled = run.fields().weight.as_constant() != Some(0.0);
+    let crests = match run.faced().filter(|_| is_pulled) {
+        Some(pieces) => pieces.points().map(|(point, _)| *point).collect(),
+        None if run.pairs_atoms() => repelling_crests(run.fields(), watch)?,
+        None => Vec::new(),
     };
     if !crests.is_empty() {
         let settling = Settling { scatterer: method.scatterer(), options };

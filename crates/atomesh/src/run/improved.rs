@@ -111,7 +111,7 @@ fn met_features<const D: usize>(
 ) -> (Vec<FeatureFacet<D>>, Option<Warning>) {
     let Some(pieces) = run.pieces() else { return (Vec::new(), None) };
     let facets = feature_facets(mesh, pieces, run.distance());
-    let Unmet { share, places } = unmet(mesh, &facets, pieces, run.distance());
+    let Unmet { share, places, .. } = unmet(mesh, &facets, pieces, run.distance());
     let warning = places.first().filter(|_| share >= LEAST_UNMET).map(|place| {
         let (frame, units) = (&run.parts().frame, run.options().units);
         let place = frame.lattice_to_world(units, place).map(|x| format!("{x:.6}"));

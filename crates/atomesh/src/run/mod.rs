@@ -31,6 +31,7 @@
 //! # Ok::<(), Box<dyn std::error::Error>>(())
 //! ```
 
+mod across;
 mod compiled;
 #[cfg(test)]
 mod conform_tests;
@@ -56,6 +57,7 @@ mod stage_tests;
 mod tests;
 mod tools;
 
+pub use across::AcrossFeature;
 pub use connected::Connected;
 pub use divided::Divided;
 pub use error::{RunError, Warning};

@@ -4,8 +4,8 @@ use rayon::prelude::*;
 
 use crate::conform::FeatureFacet;
 use crate::features::{
-    FacetField, FacetsOfFeature, FeatureFaces, FeatureFacetOptions, FeatureSet, feature_faces,
-    find_features,
+    FacetField, FacetsOfFeature, FeatureFaces, FeatureFacetOptions, FeatureSet, faces_of_pieces,
+    feature_faces, find_features,
 };
 use crate::fields::{NominalDistance, ScalarField, feature_density};
 use crate::geometry::{Bounds, Point};
@@ -20,6 +20,7 @@ use crate::optimize::OptimizeReport;
 use crate::region::{Outline, interfaces};
 use crate::watch::Watch;
 
+use super::across::AcrossFeature;
 use super::compiled::Stages;
 use super::error::{RunError, Warning};
 use super::prepared::Prepared;
@@ -101,13 +102,14 @@ impl<const D: usize> Outcome<D> {
         (self.stages().sample_cells)(self)
     }
 
-    /// The faces of the Voronoi cells that lie on features: |b| is 0.2 or more along them in the mean, in
-    /// groups of 2 d (3-D: 2 d²) or more.
+    /// The faces of the Voronoi cells that lie on features. Of clean lines and sheets ([`Prepared::faced`]) they are those
+    /// between cells on their two sides; else |b| is 0.2 or more along them in the mean, in groups of 2 d (3-D: 2 d²) or
+    /// more.
     pub fn cell_features(&self) -> Option<FeatureFaces> {
         self.cell_features_from(FEATURE)
     }
 
-    /// The same with another value for the least mean of |b| along a face, above 0.
+    /// The same with another value for the least mean of |b| along a face, above 0, where that decides.
     pub fn cell_features_from(&self, least: f64) -> Option<FeatureFaces> {
         (self.stages().cell_features)(self, least)
     }
@@ -186,6 +188,24 @@ impl<const D: usize> Outcome<D> {
         &self.outline_facets
     }
 
+    /// The facets of the features that the mesh was made to keep to, by ascending corners; none if it was not.
+    pub fn feature_facets(&self) -> &[FeatureFacet<D>] {
+        &self.feature_facets
+    }
+
+    /// The facets between cells on the two sides of a feature, whether they lie on the feature or not, without those
+    /// within 3/4 d of an end that the feature has inside the box. What flows across them and is no barrier passes the
+    /// feature where it is not met. If the mesh was not made to keep to features, these are all deep valleys of b.
+    ///
+    /// # Errors
+    /// [`RunError::Cancelled`].
+    pub fn across_features(
+        &self,
+        watch: &mut dyn Watch,
+    ) -> Result<Vec<AcrossFeature<D>>, RunError> {
+        (self.stages().across_features)(self, watch)
+    }
+
     /// The label of each cell, if there were labels.
     pub fn labels(&self) -> Option<&[i32]> {
         self.labels.as_deref()
@@ -257,7 +277,10 @@ pub(super) fn features_of<const D: usize>(
 }
 
 /// The features that the mesh was made to keep to, or that its facets follow.
-fn own_features<const D: usize>(outcome: &Outcome<D>, mesh: &Mesh<D>) -> Option<FeatureSet<D>> {
+pub(super) fn own_features<const D: usize>(
+    outcome: &Outcome<D>,
+    mesh: &Mesh<D>,
+) -> Option<FeatureSet<D>> {
     let Some(pieces) = outcome.run.pieces() else {
         let followed = &outcome.followed;
         return (!followed.is_empty()).then(|| FeatureSet::of_groups(mesh, followed));
@@ -322,8 +345,12 @@ pub(super) fn cell_features_of<const D: usize>(
     least: f64,
 ) -> Option<FeatureFaces> {
     let least_area = LEAST_FEATURE * outcome.distance().mean().powi(D as i32 - 1);
-    let of = |cells| feature_faces(cells, outcome.potential(), least, least_area);
-    outcome.cells.as_ref().map(of)
+    let (potential, distance) = (outcome.potential(), outcome.distance());
+    let cells = outcome.cells.as_ref()?;
+    Some(match outcome.run.faced() {
+        Some(pieces) => faces_of_pieces(cells, pieces, distance, potential),
+        None => feature_faces(cells, potential, least, least_area),
+    })
 }
 
 /// [`Outcome::feature_density`].

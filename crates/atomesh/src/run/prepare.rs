@@ -69,9 +69,12 @@ pub(super) fn prepare<const D: usize>(
     warnings.extend(coarse(&grid, &distance));
     check(watch, Phase::Distance, 1.0, None)?;
     let potential = ScalarField::potential(grid, samples, options.interpolation)?;
-    let (mut pieces, mut crests) = (None, Vec::new());
+    let (mut pieces, mut crests, mut faced) = (None, Vec::new(), None);
     let asked = options.improve.align;
     if matches!(asked, Align::Auto | Align::Conform) {
+        if are_faced(&options, is_masked) {
+            faced = find_faced(&inputs, &options, &potential, &distance, watch)?;
+        }
         match why_not(&options, &grid, &distance, is_masked) {
             Some(why) if asked == Align::Conform => warnings.push(Warning::NotConforming { why }),
             Some(_) => {}
@@ -92,9 +95,11 @@ pub(super) fn prepare<const D: usize>(
         fields,
         outline,
         labels,
+        is_potential: inputs.is_potential,
         warnings,
         pieces,
         crests,
+        faced,
     }))
 }
 
@@ -109,6 +114,31 @@ fn labels<const D: usize>(inputs: &Inputs<'_, D>) -> Result<Option<Samples>, Run
     let masked = labels.iter().zip(inside);
     let masked = masked.map(|(&label, inside)| if inside { f64::from(label) } else { f64::NAN });
     Ok(Some(Samples::F64(masked.collect())))
+}
+
+/// Whether faces of Voronoi cells are made to fall on features.
+fn are_faced<const D: usize>(options: &MeshOptions<D>, is_masked: bool) -> bool {
+    options.kind == MeshKind::Voronoi && options.mirror && options.features.repel && !is_masked
+}
+
+/// The pieces of features that faces are to fall on, if there are any. They are looked for in b as triangles would have it:
+/// widened for cells, features run into each other where they cross.
+fn find_faced<const D: usize>(
+    inputs: &Inputs<'_, D>,
+    options: &MeshOptions<D>,
+    potential: &ScalarField<D>,
+    distance: &NominalDistance<D>,
+    watch: &mut dyn Watch,
+) -> Result<Option<Pieces<D>>, RunError> {
+    if inputs.is_potential {
+        return Ok(find_features(inputs, options, potential, distance, watch)?.pieces());
+    }
+    let features = FeatureOptions { repel: false, ..options.features };
+    let attracting = MeshOptions { kind: MeshKind::Delaunay, features, ..options.clone() };
+    // what is odd about it has been said
+    let samples = potential_samples(inputs, &attracting, &mut Vec::new(), watch)?;
+    let narrow = ScalarField::potential(*potential.grid(), samples, options.interpolation)?;
+    Ok(find_features(inputs, &attracting, &narrow, distance, watch)?.pieces())
 }
 
 /// Where the mesh ends, if there is a mask and it does not hold the whole box.
@@ -169,6 +199,15 @@ enum Found<const D: usize> {
     Crests(Vec<FeaturePoint<D>>),
 }
 
+impl<const D: usize> Found<D> {
+    fn pieces(self) -> Option<Pieces<D>> {
+        match self {
+            Self::Pieces(pieces) => Some(pieces),
+            Self::Crests(_) => None,
+        }
+    }
+}
+
 /// The features, in lattice coordinates.
 fn find_features<const D: usize>(
     inputs: &Inputs<'_, D>,
@@ -195,15 +234,13 @@ fn find_features<const D: usize>(
         }
     }
     if is_valley {
-        points.extend(deep_valleys(potential, distance, watch)?);
+        points.extend(deep_valleys(potential, distance, options.features.repel, watch)?);
     }
-    let size = grid.in_samples(distance.least());
-    let least_count = LEAST_PIECE[D - 2] * size.powi(D as i32 - 1);
     if options.improve.align == Align::Auto && Pieces::clean_share(&points, grid) < LEAST_CLEAN {
         let valleys = wide_valleys(potential, distance, watch)?;
         return Ok(Found::Crests(valleys));
     }
-    let pieces = Pieces::new(points, grid, least_count.ceil() as usize);
+    let pieces = Pieces::new(points, grid, least_piece(grid, distance));
     Ok(if pieces.is_empty() { Found::Crests(Vec::new()) } else { Found::Pieces(pieces) })
 }
 
@@ -221,19 +258,46 @@ fn wide_valleys<const D: usize>(
     Ok(in_large_groups(found, grid.shape, size))
 }
 
-/// The bottoms of the deep valleys of b, in lattice coordinates.
+/// The crests of all deep valleys of b, or of −b where features repel, as pieces; clean or not.
+pub(super) fn crests<const D: usize>(
+    potential: &ScalarField<D>,
+    distance: &NominalDistance<D>,
+    repels: bool,
+    watch: &mut dyn Watch,
+) -> Result<Pieces<D>, RunError> {
+    let points = deep_valleys(potential, distance, repels, watch)?;
+    Ok(Pieces::new(points, potential.grid(), least_piece(potential.grid(), distance)))
+}
+
+/// The fewest points of a piece of a feature.
+fn least_piece<const D: usize>(grid: &Grid<D>, distance: &NominalDistance<D>) -> usize {
+    let size = grid.in_samples(distance.least());
+    (LEAST_PIECE[D - 2] * size.powi(D as i32 - 1)).ceil() as usize
+}
+
+/// The bottoms of the deep valleys of b, or of −b where features repel, in lattice coordinates.
 fn deep_valleys<const D: usize>(
     potential: &ScalarField<D>,
     distance: &NominalDistance<D>,
+    repels: bool,
     watch: &mut dyn Watch,
 ) -> Result<Vec<FeaturePoint<D>>, RunError> {
     let grid = potential.grid();
-    if potential.range().0 > -LEAST_DEPTH {
+    let (low, high) = potential.range();
+    if (if repels { -high } else { low }) > -LEAST_DEPTH {
         return Ok(Vec::new());
     }
+    let turned: Vec<f32>;
+    let valleys = match repels {
+        true => {
+            turned = potential.samples().iter().map(|b| -b).collect();
+            &turned[..]
+        }
+        false => potential.samples(),
+    };
     let size = grid.in_samples(distance.least());
     let sigma = ((size / 6.0).powi(2) - 1.0).max(LEAST_VARIANCE).sqrt();
-    let found = enhance::valley_points(potential.samples(), grid, sigma, LEAST_DEPTH, watch)?;
+    let found = enhance::valley_points(valleys, grid, sigma, LEAST_DEPTH, watch)?;
     let found = in_large_groups(strongest(found, DEPTH_SHARE), grid.shape, size);
     let high = GROUP_DEPTH_SHARE * f64::from(strongest_tenth(&found));
     let limits = Hysteresis { low: 0.0, high, least_count: 0 };

@@ -42,11 +42,15 @@ pub(super) struct Parts<const D: usize> {
     pub outline: Option<Outline<D>>,
     /// The label of each sample; NaN outside of the mask.
     pub labels: Option<Samples>,
+    /// Whether the image is b itself.
+    pub is_potential: bool,
     pub warnings: Vec<Warning>,
     /// The features that facets are made to keep to.
     pub pieces: Option<Pieces<D>>,
     /// Points on the features that facets are turned onto, in lattice coordinates, where no pieces are kept to.
     pub crests: Vec<FeaturePoint<D>>,
+    /// The features that faces of Voronoi cells are made to fall on.
+    pub faced: Option<Pieces<D>>,
 }
 
 impl<const D: usize> fmt::Debug for Prepared<D> {
@@ -103,6 +107,24 @@ impl<const D: usize> Prepared<D> {
     /// The features that facets are made to keep to, if any are.
     pub fn pieces(&self) -> Option<&Pieces<D>> {
         self.0.pieces.as_ref()
+    }
+
+    /// The features that faces of Voronoi cells are made to fall on, if these are clean lines or sheets.
+    pub fn faced(&self) -> Option<&Pieces<D>> {
+        self.0.faced.as_ref()
+    }
+
+    /// What kind of features was asked for: its name, those of a mixture, or `potential`.
+    pub(super) fn kind_of_features(&self) -> String {
+        let Parts { options, is_potential, .. } = &*self.0;
+        match &options.mixture {
+            _ if *is_potential => "potential".into(),
+            Some(mixture) => {
+                let names = mixture.shares().iter().map(|share| share.features.name());
+                names.collect::<Vec<_>>().join("+")
+            }
+            None => options.features.features.name().into(),
+        }
     }
 
     /// What was odd so far.

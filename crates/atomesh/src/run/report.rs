@@ -1,17 +1,20 @@
 //! The figures of a mesh.
 
-use crate::geometry::Bounds;
+use std::collections::HashMap;
+
+use crate::geometry::{Bounds, Point};
 use crate::image::{Grid, Samples};
 use crate::measure::{
-    AlignmentOptions, AlignmentReport, FidelityReport, HomogeneityReport, MeasureError,
-    PrecisionOptions, SampledPotential, ShapeReport, SpreadReport, WantedSize, alignment,
-    alignment_of_faces, features, fidelity, precision, shape, spread,
+    AlignmentOptions, AlignmentReport, Conforming, Conformity, ConformityReport, FeatureConformity,
+    FidelityReport, HomogeneityReport, MeasureError, PrecisionOptions, SampledPotential,
+    ShapeReport, SpreadReport, WantedSize, alignment, alignment_of_faces, conformity, features,
+    fidelity, precision, shape, spread,
 };
 use crate::mesh::{Mesh, PolyReport};
 use crate::watch::Watch;
 
 use super::error::RunError;
-use super::outcome::{Outcome, in_samples};
+use super::outcome::{Outcome, in_samples, own_features};
 
 /// The figures of a mesh: its shape, and how it follows the image.
 #[derive(Clone, Debug, PartialEq, serde::Serialize)]
@@ -20,6 +23,11 @@ pub struct MeshReport {
     pub shape: ShapeReport,
     /// How facets follow the potential's valleys.
     pub alignment: AlignmentReport,
+    /// The features that the mesh was made to keep to, in the order of their tags; last those without facets. None if
+    /// it was not made to conform.
+    pub features: Vec<FeatureConformity>,
+    /// How the mesh keeps to them, if it was made to.
+    pub conformity: Option<ConformityReport>,
     /// All angles, and edges over d.
     pub spread: SpreadReport,
     /// How well the mesh carries an image, if one was given.
@@ -82,7 +90,15 @@ impl MeshReport {
         let mut alignment = alignment(&mesh, &found, &options, watch)?;
         let selected = precision(&mesh, b, &found, PrecisionOptions::new(size), watch)?;
         alignment.selected = Some(selected);
-        Ok(Self { shape, alignment, spread, fidelity: None, homogeneity: None })
+        Ok(Self {
+            shape,
+            alignment,
+            features: Vec::new(),
+            conformity: None,
+            spread,
+            fidelity: None,
+            homogeneity: None,
+        })
     }
 }
 
@@ -114,7 +130,45 @@ pub(super) fn of_mesh<const D: usize>(
     let size = WantedSize { mean: outcome.distance().mean(), at_points };
     let (grid, potential) = (outcome.potential().grid(), outcome.potential().samples());
     let against = Measured { grid, potential, bounds: outcome.bounds() };
-    Ok(MeshReport::within(outcome.mesh(), against, size, watch)?)
+    let mut report = MeshReport::within(outcome.mesh(), against, size, watch)?;
+    if let Some(Conformity { features, all }) = conformity_of(outcome, watch)? {
+        (report.features, report.conformity) = (features, Some(all));
+    }
+    Ok(report)
+}
+
+/// How the mesh keeps to the features that it was made to keep to, if it was.
+fn conformity_of<const D: usize>(
+    outcome: &Outcome<D>,
+    watch: &mut dyn Watch,
+) -> Result<Option<Conformity>, RunError> {
+    let run = outcome.run();
+    let (Some(pieces), Some(tagged)) = (run.pieces(), own_features(outcome, outcome.mesh())) else {
+        return Ok(None);
+    };
+    let facets = outcome.feature_facets();
+    let piece_of: HashMap<[u32; D], u32> =
+        facets.iter().map(|facet| (facet.corners, facet.piece)).collect();
+    let tagged: Vec<u32> = (tagged.features.iter())
+        .filter_map(|feature| {
+            let mut corners = *feature.facets.first()?;
+            corners.sort_unstable();
+            piece_of.get(&corners).copied()
+        })
+        .collect();
+    let (frame, units) = (outcome.frame(), outcome.units());
+    let to_world = |p: &Point<D>| frame.lattice_to_world(units, p);
+    let conforming = Conforming {
+        mesh: outcome.mesh(),
+        facets,
+        pieces,
+        tagged: &tagged,
+        kind: &run.kind_of_features(),
+        distance: outcome.distance(),
+        step: outcome.potential().grid().step,
+        to_world: &to_world,
+    };
+    Ok(Some(conformity(&conforming, watch)?))
 }
 
 /// [`Outcome::fidelity`].

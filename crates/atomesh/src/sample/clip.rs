@@ -9,7 +9,7 @@ use crate::geometry::Point;
 /// A box is one wide and centred at its sample, cut where it would leave the image: the first and the last
 /// are half as wide.
 #[derive(Clone, Copy, Debug)]
-pub(super) struct Axis {
+pub(crate) struct Axis {
     /// How many boxes there are.
     pub count: usize,
     /// Where the last box ends; the first begins at 0.

@@ -22,7 +22,7 @@ use crate::geometry::Point;
 use crate::image::{Frame, Image, Samples, Units};
 use crate::watch::{Cancelled, Phase, Watch, check};
 pub use cells::CellSurfaces;
-use clip::Axis;
+pub(crate) use clip::Axis;
 use overlap::{Overlaps, Surface};
 use rayon::prelude::*;
 use statistic::Tally;
@@ -169,8 +169,8 @@ pub fn sample_in_frame<const D: usize>(
     Ok(properties)
 }
 
-/// Checks that every statistic is defined for the samples.
-fn check_samples<const D: usize>(
+/// Checks that there are as many samples as the frame says, and that every statistic is defined for them.
+pub(crate) fn check_samples<const D: usize>(
     frame: &Frame<D>,
     samples: &Samples,
     statistics: &[Statistic],

@@ -185,6 +185,11 @@ impl<const D: usize> Pieces<D> {
         self.patches.iter().zip(&self.of_patches).map(|(patch, (piece, _))| (patch.at, *piece))
     }
 
+    /// The width of the cubes in each of which a piece has one of [`Self::places`], if it has points there.
+    pub(crate) fn width(&self) -> f64 {
+        PATCH * self.step
+    }
+
     /// How far apart [`Self::places`] are at most, in mean steps.
     pub(crate) fn apart(&self) -> f64 {
         PATCH * (D as f64).sqrt()
@@ -271,6 +276,11 @@ impl<const D: usize> Pieces<D> {
         let is_at_side =
             (0..D).any(|k| x[k] < self.bounds.min[k] + near || x[k] > self.bounds.max[k] - near);
         self.step * if is_at_side { END_AT_SIDE } else { END }
+    }
+
+    /// Whether a piece has a point within `reach` of `x`: not so where it was led on.
+    pub(crate) fn has_point_near(&self, piece: u32, x: &Point<D>, reach: f64) -> bool {
+        self.gap(piece, x) <= reach
     }
 
     /// How far `x` is from the nearest point of a piece.
