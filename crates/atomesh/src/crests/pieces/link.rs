@@ -21,17 +21,17 @@ const ALIKE: f64 = 0.93;
 /// Points with other normals near a point are of a feature that meets the point's own.
 const NEXT: Next = Next { reach: 2.0, most: 0.12 };
 /// The same in space, where sheets cross along lines, and their valleys pass over into each other somewhere along these.
-const NEXT_IN_SPACE: Next = Next { reach: 3.5, most: 0.1 };
+const NEXT_IN_SPACE: Next = Next { reach: 2.5, most: 0.12 };
 /// In space points this near to a side of the image, in mean steps, say nothing: samples mirrored there turn their normals,
 /// and sheets at a slant pass over into each other. Pieces are led on to sides.
-const AT_SIDE: f64 = 2.5;
+const AT_SIDE: f64 = 2.0;
 /// How many points are asked for the share of those on clean features.
 const ASKED: usize = 20_000;
 /// Sets of fewer points, in space of fewer than the square, are linked anew with what is left.
 const SMALL: usize = 12;
 /// What goes on across a place where features meet, and what over a gap. Reaches are set where they are used.
 const ACROSS: Alike = Alike { reach: 0.0, cosine: 0.96, slope: 0.08, slack: 0.4 };
-const OVER_GAPS: Alike = Alike { reach: 0.0, cosine: 0.88, slope: 0.22, slack: 0.4 };
+const OVER_GAPS: Alike = Alike { reach: 0.0, cosine: 0.95, slope: 0.12, slack: 0.4 };
 /// The fewest points on a point's plane, itself among them, in the plane; twice as many in space.
 const LEAST_ON: usize = 4;
 
