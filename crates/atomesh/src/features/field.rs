@@ -18,9 +18,6 @@ const MOST_PARTS: f64 = 64.0;
 /// A facet lies on a crest whose normal is within this of its own, 30°, as cosine.
 const ALONG: f64 = 0.866;
 
-/// No crest within so many reaches of a facet's middle: the facet lies on none.
-const NEAR: f64 = 1.8;
-
 /// How far along a feature one of its points stands for it, in steps: half the diagonal of a sample's cell in space.
 const STANDS_FOR: f64 = 0.87;
 
@@ -96,7 +93,8 @@ impl<const D: usize> FacetField<D> {
 
     /// How much of each facet lies on crests of an image, given by points about a step apart: in place of the greatest b
     /// there is −1 times the share of the facet that is within `reach` of a crest and turned as it is, within 30°; in
-    /// place of the mean of b, that times the mean strength of the crests there.
+    /// place of the mean of b, that times the mean strength of the crests there. A facet that has no crest at its middle
+    /// nor halfway from there to its corners counts as one that lies on none.
     ///
     /// All in the mesh's coordinates; `step` is the mean step of samples there.
     ///
@@ -111,7 +109,9 @@ impl<const D: usize> FacetField<D> {
     ) -> Result<Self, FeaturesError> {
         let bounds = Bounds::of(mesh.points()).unwrap_or(Bounds { min: [0.0; D], max: [0.0; D] });
         let positions = crests.iter().map(|point| point.position);
-        let near = Crests { crests, grid: PointGrid::new(&bounds, reach, positions), step, reach };
+        let around = Around::new(&bounds, reach + STANDS_FOR * step, positions.clone());
+        let grid = PointGrid::new(&bounds, reach, positions);
+        let near = Crests { crests, grid, around, step, reach };
         let longest = if D == 2 { 0.5 * step } else { 1.5 * step };
         Self::read(mesh, watch, |corners, normal| near.along(corners, normal, longest))
     }
@@ -151,6 +151,7 @@ impl<const D: usize> FacetField<D> {
 struct Crests<'a, const D: usize> {
     crests: &'a [FeaturePoint<D>],
     grid: PointGrid<D>,
+    around: Around<D>,
     step: f64,
     reach: f64,
 }
@@ -163,15 +164,22 @@ impl<const D: usize> Crests<'_, D> {
             return (0.0, 0.0);
         }
         let normal = normal.map(|n| n / length);
-        // most facets are far from all crests
-        let middle = std::array::from_fn(|k| corners.iter().map(|c| c[k]).sum::<f64>() / D as f64);
-        if !self.is_near(&middle) {
+        let parts = parts(corners, longest);
+        let place = |weights: [f64; D]| -> Point<D> {
+            std::array::from_fn(|k| (0..D).map(|i| weights[i] * corners[i][k]).sum())
+        };
+        // most facets lie on none: a look at their middle and halfway to their corners tells
+        let middle: [f64; D] = [1.0 / D as f64; D];
+        let halfway = |k: usize| -> [f64; D] {
+            std::array::from_fn(|i| 0.5 * middle[i] + if i == k { 0.5 } else { 0.0 })
+        };
+        let mut looks = std::iter::once(middle).chain((0..D).map(halfway));
+        if !looks.any(|weights| self.strongest(&place(weights), &normal) > 0.0) {
             return (0.0, 0.0);
         }
         let (mut count, mut on, mut strength) = (0.0, 0.0, 0.0);
-        each_middle(parts(corners, longest), |weights: [f64; D]| {
-            let at = std::array::from_fn(|k| (0..D).map(|i| weights[i] * corners[i][k]).sum());
-            let found = self.strongest(&at, &normal);
+        each_middle(parts, |weights: [f64; D]| {
+            let found = self.strongest(&place(weights), &normal);
             count += 1.0;
             on += f64::from(u8::from(found > 0.0));
             strength += found;
@@ -179,18 +187,12 @@ impl<const D: usize> Crests<'_, D> {
         (-strength / count, -on / count)
     }
 
-    /// Whether a crest is near a place, if not so near that a facet there lies on it.
-    fn is_near(&self, place: &Point<D>) -> bool {
-        let (mut is_near, reach) = (false, NEAR * self.reach + STANDS_FOR * self.step);
-        self.grid.near(place, reach, |crest, _| {
-            is_near |= distance_squared(crest, place) <= reach * reach;
-        });
-        is_near
-    }
-
     /// The strength of the strongest crest at a place, turned as a facet with that normal; 0 if there is none.
     fn strongest(&self, at: &Point<D>, normal: &Point<D>) -> f64 {
         let mut strongest = 0.0f64;
+        if !self.around.holds(at) {
+            return strongest;
+        }
         self.grid.near(at, self.reach + STANDS_FOR * self.step, |place, i| {
             let crest = &self.crests[i];
             let offset = difference(place, at);
@@ -204,6 +206,50 @@ impl<const D: usize> Crests<'_, D> {
             }
         });
         strongest
+    }
+}
+
+/// Cubes with a point in them or beside them.
+struct Around<const D: usize> {
+    min: Point<D>,
+    width: f64,
+    shape: [usize; D],
+    are_around: Vec<bool>,
+}
+
+impl<const D: usize> Around<D> {
+    /// Cubes of a width, so that all places nearer than this to a point are in one that counts.
+    fn new(bounds: &Bounds<D>, width: f64, points: impl Iterator<Item = Point<D>>) -> Self {
+        let shape = bounds.extent().map(|extent| (extent / width) as usize + 1);
+        let are_around = vec![false; shape.iter().product()];
+        let mut cubes = Self { min: bounds.min, width, shape, are_around };
+        for point in points {
+            let cube = cubes.cube(&point);
+            cubes.are_around[cube] = true;
+        }
+        let mut stride = 1;
+        for count in shape {
+            let before = cubes.are_around.clone();
+            for (cube, is_around) in cubes.are_around.iter_mut().enumerate() {
+                let at = cube / stride % count;
+                *is_around |= at > 0 && before[cube - stride];
+                *is_around |= at + 1 < count && before[cube + stride];
+            }
+            stride *= count;
+        }
+        cubes
+    }
+
+    fn holds(&self, place: &Point<D>) -> bool {
+        self.are_around[self.cube(place)]
+    }
+
+    /// The number of the cube of a place; of one outside, the nearest.
+    fn cube(&self, place: &Point<D>) -> usize {
+        (0..D).rev().fold(0, |index, k| {
+            let at = ((place[k] - self.min[k]) / self.width).max(0.0) as usize;
+            index * self.shape[k] + at.min(self.shape[k] - 1)
+        })
     }
 }
 
@@ -265,6 +311,7 @@ fn each_middle<const D: usize>(parts: usize, mut visit: impl FnMut([f64; D])) {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use proptest::prelude::*;
 
     fn middles_make_the_mean_of_a_plane_exact<const D: usize>() {
         // the mean of a linear function is its value at the centroid, 1 / D for every weight
@@ -306,5 +353,21 @@ mod tests {
     fn the_mean_is_within_a_hundredth_of_a_fine_one() {
         near_a_fine_sum::<2>(0.5);
         near_a_fine_sum::<3>(1.0);
+    }
+
+    proptest! {
+        #[test]
+        fn places_near_a_point_are_in_cubes_that_count(
+            point in [0.0..9.0f64, 0.0..4.0, 0.0..6.0],
+            towards in [-1.0..1.0f64, -1.0..1.0, -1.0..1.0],
+            width in 0.3..3.0f64,
+        ) {
+            let bounds = Bounds { min: [0.0; 3], max: [9.0, 4.0, 6.0] };
+            let around = Around::new(&bounds, width, [point].into_iter());
+            let near = std::array::from_fn(|k| point[k] + 0.57 * width * towards[k]);
+            prop_assert!(around.holds(&bounds.clamp(&near)));
+            let far = if point[0] > 4.5 { 0.0 } else { 9.0 };
+            prop_assert!(width > 1.4 || !around.holds(&[far, point[1], point[2]]));
+        }
     }
 }

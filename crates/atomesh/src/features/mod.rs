@@ -49,9 +49,9 @@ pub struct FeatureFacetOptions {
     pub below: f64,
     /// The value of b that is compared. Default the mean.
     pub test: FacetTest,
-    /// Pieces of fewer facets are dropped. Default 3.
+    /// Pieces of fewer facets are dropped, but those without a free end (2-D) or side (3-D), which join others. Default 3.
     pub min_facets: usize,
-    /// Pieces shorter (2-D) or smaller (3-D) than this are dropped, in lattice units. Default 0.
+    /// The same for pieces shorter (2-D) or smaller (3-D) than this, in lattice units. Default 0.
     pub min_measure: f64,
     /// Whether facets are added where two ends (2-D) or borders (3-D) are one facet apart. Default false.
     pub close_gaps: bool,
