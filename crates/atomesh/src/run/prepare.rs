@@ -69,7 +69,7 @@ pub(super) fn prepare<const D: usize>(
     warnings.extend(coarse(&grid, &distance));
     check(watch, Phase::Distance, 1.0, None)?;
     let potential = ScalarField::potential(grid, samples, options.interpolation)?;
-    let (mut pieces, mut crests, mut faced) = (None, Vec::new(), None);
+    let (mut found, mut faced) = (Found::default(), None);
     let asked = options.improve.align;
     if matches!(asked, Align::Auto | Align::Conform) {
         if are_faced(&options, is_masked) {
@@ -78,12 +78,9 @@ pub(super) fn prepare<const D: usize>(
         match why_not(&options, &grid, &distance, is_masked) {
             Some(why) if asked == Align::Conform => warnings.push(Warning::NotConforming { why }),
             Some(_) => {}
-            None => match find_features(&inputs, &options, &potential, &distance, watch)? {
-                Found::Pieces(found) => pieces = Some(found),
-                Found::Crests(found) => crests = found,
-            },
+            None => found = find_features(&inputs, &options, &potential, &distance, watch)?,
         }
-        options.improve.align = if pieces.is_some() { Align::Conform } else { Align::Full };
+        options.improve.align = if found.pieces.is_some() { Align::Conform } else { Align::Full };
     }
     let fields = Fields::new(potential, weight, distance)?;
     let method = method.clone();
@@ -97,8 +94,8 @@ pub(super) fn prepare<const D: usize>(
         labels,
         is_potential: inputs.is_potential,
         warnings,
-        pieces,
-        crests,
+        pieces: found.pieces,
+        crests: found.crests,
         faced,
     }))
 }
@@ -131,14 +128,14 @@ fn find_faced<const D: usize>(
     watch: &mut dyn Watch,
 ) -> Result<Option<Pieces<D>>, RunError> {
     if inputs.is_potential {
-        return Ok(find_features(inputs, options, potential, distance, watch)?.pieces());
+        return Ok(find_features(inputs, options, potential, distance, watch)?.pieces);
     }
     let features = FeatureOptions { repel: false, ..options.features };
     let attracting = MeshOptions { kind: MeshKind::Delaunay, features, ..options.clone() };
     // what is odd about it has been said
     let samples = potential_samples(inputs, &attracting, &mut Vec::new(), watch)?;
     let narrow = ScalarField::potential(*potential.grid(), samples, options.interpolation)?;
-    Ok(find_features(inputs, &attracting, &narrow, distance, watch)?.pieces())
+    Ok(find_features(inputs, &attracting, &narrow, distance, watch)?.pieces)
 }
 
 /// Where the mesh ends, if there is a mask and it does not hold the whole box.
@@ -192,20 +189,12 @@ fn why_not<const D: usize>(
 }
 
 /// Features that facets are to follow.
-enum Found<const D: usize> {
+#[derive(Default)]
+struct Found<const D: usize> {
     /// Atoms are put on these.
-    Pieces(Pieces<D>),
-    /// Too ragged for rows of atoms: facets are turned onto these. Or there are none.
-    Crests(Vec<FeaturePoint<D>>),
-}
-
-impl<const D: usize> Found<D> {
-    fn pieces(self) -> Option<Pieces<D>> {
-        match self {
-            Self::Pieces(pieces) => Some(pieces),
-            Self::Crests(_) => None,
-        }
-    }
+    pieces: Option<Pieces<D>>,
+    /// Facets are turned onto these, which are too ragged for rows of atoms.
+    crests: Vec<FeaturePoint<D>>,
 }
 
 /// The features, in lattice coordinates.
@@ -237,11 +226,11 @@ fn find_features<const D: usize>(
         points.extend(deep_valleys(potential, distance, options.features.repel, watch)?);
     }
     if options.improve.align == Align::Auto && Pieces::clean_share(&points, grid) < LEAST_CLEAN {
-        let valleys = wide_valleys(potential, distance, watch)?;
-        return Ok(Found::Crests(valleys));
+        let crests = wide_valleys(potential, distance, watch)?;
+        return Ok(Found { crests, pieces: None });
     }
     let pieces = Pieces::new(points, grid, least_piece(grid, distance));
-    Ok(if pieces.is_empty() { Found::Crests(Vec::new()) } else { Found::Pieces(pieces) })
+    Ok(Found { pieces: (!pieces.is_empty()).then_some(pieces), crests: Vec::new() })
 }
 
 /// The valleys of b that facets are measured against: of b smoothed by max(1, d/6) samples, deeper than a quarter, and in
