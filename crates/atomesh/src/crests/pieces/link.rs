@@ -24,7 +24,7 @@ const NEXT: Next = Next { reach: 2.0, most: 0.12 };
 const NEXT_IN_SPACE: Next = Next { reach: 2.5, most: 0.12 };
 /// In space points this near to a side of the image, in mean steps, say nothing: samples mirrored there turn their normals,
 /// and sheets at a slant pass over into each other. Pieces are led on to sides.
-const AT_SIDE: f64 = 2.5;
+const AT_SIDE: f64 = 2.0;
 /// How many points are asked for the share of those on clean features.
 const ASKED: usize = 20_000;
 /// Sets of fewer points, in space of fewer than the square, are linked anew with what is left.
