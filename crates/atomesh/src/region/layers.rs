@@ -36,7 +36,7 @@ pub struct ThinLayer {
     pub thickness: f64,
 }
 
-/// An image of labels in lattice space. What is no integer, such as NaN outside of a mask, is no label.
+/// An image of labels in lattice space. A value that is not an integer, such as NaN outside of a mask, is no label.
 #[derive(Clone, Copy)]
 pub(crate) struct LabelImage<'a, const D: usize> {
     /// Where the samples are.
@@ -225,7 +225,7 @@ fn counts(
 #[derive(Clone, Copy, Default)]
 struct InCells {
     measure: f64,
-    /// How many parts that are no specks.
+    /// How many parts are larger than a speck.
     parts: usize,
 }
 

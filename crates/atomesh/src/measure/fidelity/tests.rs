@@ -136,7 +136,7 @@ fn scattered<const D: usize>(
     delaunay.connect(&points, &mut Silent).unwrap()
 }
 
-/// Waves, with some samples that are no numbers if `gaps`.
+/// Waves; with `gaps`, some samples are NaN.
 fn waves<const D: usize>(shape: [usize; D], gaps: bool) -> (Frame<D>, Samples) {
     let value = |i: usize| match gaps && i % 17 == 3 {
         true => f64::NAN,
