@@ -1,7 +1,14 @@
 //! Facets: the edges of triangles, the faces of tetrahedra, each with the cells beside it.
 
+use std::ops::Range;
+
+use rayon::prelude::*;
+
 use super::Mesh;
 use crate::geometry::{Point, difference};
+
+/// Points whose facets one task gathers.
+const BLOCK: usize = 1 << 12;
 
 /// A facet of a mesh: an edge in 2-D, a triangle in 3-D.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -28,12 +35,19 @@ impl<const D: usize> Mesh<D> {
     /// All facets, in lexicographic order of their corners. Of more than two cells at a facet, a fault that
     /// [`Mesh::validate`] names, the two lowest are given. Cost: O(cells).
     pub fn facets(&self) -> Vec<Facet<D>> {
-        let mut facets = Vec::with_capacity(self.cell_count() * Self::CORNERS / 2);
-        self.each_facet(|halves| {
-            let neighbour = halves.get(1).map(|half| half.cell);
-            facets.push(Facet { corners: halves[0].corners, cell: halves[0].cell, neighbour });
-        });
-        facets
+        let cells = self.cells_of_points();
+        let of_block = |block: usize| {
+            let mut facets = Vec::new();
+            let start = block * BLOCK;
+            let points = start as u32..self.points.len().min(start + BLOCK) as u32;
+            self.each_facet_led_by(points, &cells, |halves| {
+                let neighbour = halves.get(1).map(|half| half.cell);
+                facets.push(Facet { corners: halves[0].corners, cell: halves[0].cell, neighbour });
+            });
+            facets
+        };
+        let blocks = (0..self.points.len().div_ceil(BLOCK)).into_par_iter().map(of_block);
+        blocks.collect::<Vec<_>>().concat()
     }
 
     /// The facet of a cell opposite to its corner number `opposite`, its normal out of the cell if the
@@ -71,10 +85,19 @@ impl<const D: usize> Mesh<D> {
     }
 
     /// Calls `visit` with each facet as all of its cells have it, by ascending cells; facets come in lexicographic order.
-    pub(super) fn each_facet(&self, mut visit: impl FnMut(&[HalfFacet<D>])) {
-        let cells = self.cells_of_points();
+    pub(super) fn each_facet(&self, visit: impl FnMut(&[HalfFacet<D>])) {
+        self.each_facet_led_by(0..self.points.len() as u32, &self.cells_of_points(), visit);
+    }
+
+    /// [`Self::each_facet`] for facets whose lowest corner is one of these points.
+    fn each_facet_led_by(
+        &self,
+        points: Range<u32>,
+        cells: &CellsOfPoints,
+        mut visit: impl FnMut(&[HalfFacet<D>]),
+    ) {
         let mut halves: Vec<HalfFacet<D>> = Vec::new();
-        for point in 0..self.points.len() as u32 {
+        for point in points {
             halves.clear();
             for &cell in cells.of(point) {
                 self.facets_led_by(point, cell, &mut halves);
