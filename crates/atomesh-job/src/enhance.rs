@@ -82,7 +82,7 @@ pub fn enhance<const D: usize>(
         None => Mixture::from(options.features),
     };
     let made = (dimension.tools.enhance_mixture)(&mixture, &options, image, session)?;
-    let Enhanced { values, constant } = made;
+    let Enhanced { values, constant, .. } = made;
     let image = Image::new(*image.frame(), Samples::F32(values)).map_err(JobError::content)?;
     Ok(Potential { image, mixture, is_constant: constant })
 }

@@ -26,7 +26,7 @@ pub(super) fn labelled<const D: usize>(
     image: &Image<D>,
     options: &FeatureOptions,
     watch: &mut dyn Watch,
-) -> Result<Enhanced, EnhanceError> {
+) -> Result<Enhanced<D>, EnhanceError> {
     let grid = image.frame().grid(options.units);
     let labels = image.samples().to_f32();
     let sigma = grid.step.map(|step| (options.edge_scale * grid.least_step() / step).max(0.7));
@@ -42,7 +42,7 @@ pub(super) fn labelled<const D: usize>(
         values.iter_mut().for_each(|b| *b = b.clamp(-1.0, 1.0));
     }
     check(watch, Phase::Potential, 1.0, None)?;
-    Ok(Enhanced { values, constant })
+    Ok(Enhanced { values, constant, crests: None })
 }
 
 /// A label's samples: how many, and the box that holds them.

@@ -146,8 +146,8 @@ pub fn enhance_mixture<'a, const D: usize>(
     options: &FeatureOptions,
     image_of: impl Fn(Features) -> &'a Image<D>,
     watch: &mut dyn Watch,
-) -> Result<Enhanced, EnhanceError> {
-    let mut all: Option<Enhanced> = None;
+) -> Result<Enhanced<D>, EnhanceError> {
+    let mut all: Option<Enhanced<D>> = None;
     // the denoised image, for all kinds but labels
     let mut clean: Option<Image<D>> = None;
     for Share { features, weight } in &mixture.0 {
@@ -161,6 +161,7 @@ pub fn enhance_mixture<'a, const D: usize>(
         let mut one = enhance(image, &options, watch)?;
         let weight = *weight as f32;
         one.values.iter_mut().for_each(|b| *b *= weight);
+        one.crests = None; // each kind has its own
         all = Some(match all {
             None => one,
             Some(mut all) => {
@@ -174,7 +175,7 @@ pub fn enhance_mixture<'a, const D: usize>(
             }
         });
     }
-    Ok(all.unwrap_or(Enhanced { values: Vec::new(), constant: true }))
+    Ok(all.unwrap_or(Enhanced { values: Vec::new(), constant: true, crests: None }))
 }
 
 #[cfg(test)]

@@ -46,13 +46,15 @@ const LEAST_EDGE_SCALE: f64 = 0.3;
 
 /// A potential made from an image.
 #[derive(Clone, Debug, PartialEq)]
-pub struct Enhanced {
+pub struct Enhanced<const D: usize> {
     /// b at the image's samples, x fastest: −1…0, or 0…1 if it repels.
     pub values: Vec<f32>,
     /// Whether the image has no features of the kind asked for, so that b is 0 everywhere:
     /// its samples, or for edges its gradients, are all the same. Callers warn.
     /// Not set where [`Features::None`] was asked for.
     pub constant: bool,
+    /// The crests that b is made of, in lattice coordinates, where it is made of crests of one kind.
+    pub crests: Option<Vec<FeaturePoint<D>>>,
 }
 
 /// Makes the potential b(x) of an image, in units of 1.
@@ -77,7 +79,7 @@ pub fn enhance<const D: usize>(
     image: &Image<D>,
     options: &FeatureOptions,
     watch: &mut dyn Watch,
-) -> Result<Enhanced, EnhanceError> {
+) -> Result<Enhanced<D>, EnhanceError> {
     options.check()?;
     check(watch, Phase::Potential, 0.0, None)?;
     if let Some(image) = denoised(image, options, watch)? {

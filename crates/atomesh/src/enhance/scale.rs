@@ -150,7 +150,7 @@ pub(super) fn scaled<const D: usize>(
     image: &Image<D>,
     options: &FeatureOptions,
     watch: &mut dyn Watch,
-) -> Result<Enhanced, EnhanceError> {
+) -> Result<Enhanced<D>, EnhanceError> {
     let zeros = || vec![0.0; unit.len()];
     let shown = match options.features {
         Features::None => None,
@@ -162,7 +162,7 @@ pub(super) fn scaled<const D: usize>(
     check(watch, Phase::Potential, 0.8, None)?;
     let constant = shown.is_none() && options.features != Features::None;
     let Some((mut values, ramp)) = shown else {
-        return Ok(Enhanced { values: zeros(), constant });
+        return Ok(Enhanced { values: zeros(), constant, crests: None });
     };
     let sign = if options.repel { -1.0 } else { 1.0 };
     let scale = |start, part: &mut [f32]| {
@@ -186,5 +186,5 @@ pub(super) fn scaled<const D: usize>(
         parts.for_each(|(block, part)| scale(block * BLOCK, part));
     }
     check(watch, Phase::Potential, 1.0, None)?;
-    Ok(Enhanced { values, constant })
+    Ok(Enhanced { values, constant, crests: None })
 }

@@ -8,7 +8,7 @@ fn image<const D: usize>(shape: [usize; D], samples: Samples) -> Image<D> {
     Image::new(Frame::new(shape).unwrap(), samples).unwrap()
 }
 
-fn run<const D: usize>(image: &Image<D>, options: FeatureOptions) -> Enhanced {
+fn run<const D: usize>(image: &Image<D>, options: FeatureOptions) -> Enhanced<D> {
     enhance(image, &options, &mut Silent).unwrap()
 }
 

@@ -3,10 +3,9 @@
 use rayon::prelude::*;
 
 use super::{FacetTest, FeaturesError};
-use crate::crests::{FeaturePoint, PointGrid};
 use crate::fields::ScalarField;
-use crate::geometry::{Bounds, Point, difference, distance_squared, dot};
-use crate::mesh::{Facet, Mesh};
+use crate::geometry::{Point, distance_squared, dot};
+use crate::mesh::{Facet, Mesh, area_vector};
 use crate::watch::{Phase, Watch, check};
 
 /// Facets between two looks at the watch, a fixed number so that results do not depend on threads.
@@ -15,11 +14,17 @@ const BLOCK: usize = 1 << 16;
 /// Most parts into which an edge of a facet is divided.
 const MOST_PARTS: f64 = 64.0;
 
-/// A facet lies on a crest whose normal is within this of its own, 30°, as cosine.
-const ALONG: f64 = 0.866;
+/// A place within reach of the bottom of a valley is at least this deep, over the least depth of valleys.
+const HINT: f64 = 0.6;
 
-/// How far along a feature one of its points stands for it, in steps: half the diagonal of a sample's cell in space.
-const STANDS_FOR: f64 = 0.87;
+/// A facet that lies along a valley has its bottom across the middle within so many times the reach.
+const MIDDLE: f64 = 2.0;
+
+/// How far from a facet b is read on both sides, over the reach: the bottom is that of a parabola.
+const ACROSS: f64 = 1.5;
+
+/// The least second difference of b across a valley, from place to place.
+const LEAST_BEND: f64 = 1e-3;
 
 /// The facets between two cells of a mesh, each with the mean and the greatest b along it.
 ///
@@ -47,16 +52,16 @@ impl<const D: usize> FacetField<D> {
     ) -> Result<Self, FeaturesError> {
         let step = potential.grid().least_step();
         let longest = if D == 2 { 0.5 * step } else { step };
-        Self::read(mesh, watch, |corners, _| {
+        Self::read(mesh, watch, |corners| {
             mean_and_greatest(corners, longest, |p| potential.value(p))
         })
     }
 
-    /// What `of` reads along each facet, given its corners and normal: the mean and the greatest value.
+    /// What `of` reads along each facet, given its corners: the mean and the greatest value.
     fn read(
         mesh: &Mesh<D>,
         watch: &mut dyn Watch,
-        of: impl Fn(&[Point<D>; D], &Point<D>) -> (f64, f64) + Sync,
+        of: impl Fn(&[Point<D>; D]) -> (f64, f64) + Sync,
     ) -> Result<Self, FeaturesError> {
         let facets = inner_facets(mesh);
         let mut values = Vec::with_capacity(facets.len());
@@ -65,7 +70,7 @@ impl<const D: usize> FacetField<D> {
             check(watch, Phase::Measure, done as f64 / blocks as f64, None)?;
             let along = block.par_iter().with_min_len(1 << 8).map(|facet| {
                 let corners = facet.corners.map(|corner| mesh.points()[corner as usize]);
-                of(&corners, &mesh.facet_normal(&facet.corners))
+                of(&corners)
             });
             values.par_extend(along);
         }
@@ -91,29 +96,25 @@ impl<const D: usize> FacetField<D> {
         Ok(Self { facets, mean, greatest })
     }
 
-    /// How much of each facet lies on crests of an image, given by points about a step apart: in place of the greatest b
-    /// there is −1 times the share of the facet that is within `reach` of a crest and turned as it is, within 30°; in
-    /// place of the mean of b, that times the mean strength of the crests there. A facet that has no crest at its middle
-    /// nor halfway from there to its corners counts as one that lies on none.
+    /// How much of each facet lies along the bottoms of valleys: in place of the greatest b there is −1 times the share
+    /// of the facet across which b, along the facet's normal, has a bottom within `reach` and below −`least_depth`; in
+    /// place of the mean of b, that times the mean b of these bottoms. A facet across whose middle there is none even within
+    /// twice the reach counts as one that lies along none.
     ///
-    /// All in the mesh's coordinates; `step` is the mean step of samples there.
+    /// The potential is to be as smooth as valleys are looked for. The mesh is in its lattice coordinates.
     ///
     /// # Errors
     /// [`FeaturesError::Cancelled`] if the watch ends the work.
-    pub fn on_crests(
+    pub fn in_valleys(
         mesh: &Mesh<D>,
-        crests: &[FeaturePoint<D>],
-        step: f64,
+        potential: &ScalarField<D>,
         reach: f64,
+        least_depth: f64,
         watch: &mut dyn Watch,
     ) -> Result<Self, FeaturesError> {
-        let bounds = Bounds::of(mesh.points()).unwrap_or(Bounds { min: [0.0; D], max: [0.0; D] });
-        let positions = crests.iter().map(|point| point.position);
-        let around = Around::new(&bounds, reach + STANDS_FOR * step, positions.clone());
-        let grid = PointGrid::new(&bounds, reach, positions);
-        let near = Crests { crests, grid, around, step, reach };
-        let longest = if D == 2 { 0.5 * step } else { 1.5 * step };
-        Self::read(mesh, watch, |corners, normal| near.along(corners, normal, longest))
+        let longest = if D == 2 { reach } else { 2.0 * reach };
+        let valleys = Valleys { potential, reach, least_depth, longest };
+        Self::read(mesh, watch, |corners| valleys.along(corners))
     }
 
     /// Facets with given means, which are the greatest values too.
@@ -147,109 +148,52 @@ impl<const D: usize> FacetField<D> {
     }
 }
 
-/// Crests near facets.
-struct Crests<'a, const D: usize> {
-    crests: &'a [FeaturePoint<D>],
-    grid: PointGrid<D>,
-    around: Around<D>,
-    step: f64,
+/// Valleys of a potential that facets may lie along.
+struct Valleys<'a, const D: usize> {
+    potential: &'a ScalarField<D>,
     reach: f64,
+    least_depth: f64,
+    /// The greatest length of a part of a facet.
+    longest: f64,
 }
 
-impl<const D: usize> Crests<'_, D> {
-    /// The strength and the share of crests along a facet, below 0.
-    fn along(&self, corners: &[Point<D>; D], normal: &Point<D>, longest: f64) -> (f64, f64) {
-        let length = dot(normal, normal).sqrt();
-        if length == 0.0 {
-            return (0.0, 0.0);
-        }
-        let normal = normal.map(|n| n / length);
-        let parts = parts(corners, longest);
+impl<const D: usize> Valleys<'_, D> {
+    /// The depth and the share of valleys along a facet, below 0.
+    fn along(&self, corners: &[Point<D>; D]) -> (f64, f64) {
         let place = |weights: [f64; D]| -> Point<D> {
             std::array::from_fn(|k| (0..D).map(|i| weights[i] * corners[i][k]).sum())
         };
-        // most facets lie on none: a look at their middle and halfway to their corners tells
-        let middle: [f64; D] = [1.0 / D as f64; D];
-        let halfway = |k: usize| -> [f64; D] {
-            std::array::from_fn(|i| 0.5 * middle[i] + if i == k { 0.5 } else { 0.0 })
-        };
-        let mut looks = std::iter::once(middle).chain((0..D).map(halfway));
-        if !looks.any(|weights| self.strongest(&place(weights), &normal) > 0.0) {
+        let normal = area_vector(corners);
+        let area = dot(&normal, &normal).sqrt();
+        let normal = normal.map(|n| n / area); // of a flat facet NaN, so that it has no bottoms
+        if self.bottom(&place([1.0 / D as f64; D]), &normal, MIDDLE).is_none() {
             return (0.0, 0.0);
         }
-        let (mut count, mut on, mut strength) = (0.0, 0.0, 0.0);
-        each_middle(parts, |weights: [f64; D]| {
-            let found = self.strongest(&place(weights), &normal);
+        let (mut count, mut on, mut sum) = (0.0, 0.0, 0.0);
+        each_middle(parts(corners, self.longest), |weights: [f64; D]| {
+            let bottom = self.bottom(&place(weights), &normal, 1.0);
             count += 1.0;
-            on += f64::from(u8::from(found > 0.0));
-            strength += found;
+            on += f64::from(u8::from(bottom.is_some()));
+            sum += bottom.unwrap_or(0.0);
         });
-        (-strength / count, -on / count)
+        (sum / count, -on / count)
     }
 
-    /// The strength of the strongest crest at a place, turned as a facet with that normal; 0 if there is none.
-    fn strongest(&self, at: &Point<D>, normal: &Point<D>) -> f64 {
-        let mut strongest = 0.0f64;
-        if !self.around.holds(at) {
-            return strongest;
+    /// b at the bottom of the valley across a place, if it is within so many times the reach and deep enough.
+    fn bottom(&self, at: &Point<D>, normal: &Point<D>, within: f64) -> Option<f64> {
+        let here = self.potential.value(at);
+        if -here <= HINT * self.least_depth {
+            return None;
         }
-        self.grid.near(at, self.reach + STANDS_FOR * self.step, |place, i| {
-            let crest = &self.crests[i];
-            let offset = difference(place, at);
-            let above = dot(&offset, &crest.normal);
-            let beside = (dot(&offset, &offset) - above * above).max(0.0).sqrt();
-            let beside = (beside - STANDS_FOR * self.step).max(0.0);
-            if above * above + beside * beside <= self.reach * self.reach
-                && dot(&crest.normal, normal).abs() >= ALONG
-            {
-                strongest = strongest.max(crest.strength);
-            }
+        let [before, after] = [-ACROSS, ACROSS].map(|far| {
+            let far = far * self.reach;
+            self.potential.value(&std::array::from_fn(|k| at[k] + far * normal[k]))
         });
-        strongest
-    }
-}
-
-/// Cubes with a point in them or beside them.
-struct Around<const D: usize> {
-    min: Point<D>,
-    width: f64,
-    shape: [usize; D],
-    are_around: Vec<bool>,
-}
-
-impl<const D: usize> Around<D> {
-    /// Cubes of a width, so that all places nearer than this to a point are in one that counts.
-    fn new(bounds: &Bounds<D>, width: f64, points: impl Iterator<Item = Point<D>>) -> Self {
-        let shape = bounds.extent().map(|extent| (extent / width) as usize + 1);
-        let are_around = vec![false; shape.iter().product()];
-        let mut cubes = Self { min: bounds.min, width, shape, are_around };
-        for point in points {
-            let cube = cubes.cube(&point);
-            cubes.are_around[cube] = true;
-        }
-        let mut stride = 1;
-        for count in shape {
-            let before = cubes.are_around.clone();
-            for (cube, is_around) in cubes.are_around.iter_mut().enumerate() {
-                let at = cube / stride % count;
-                *is_around |= at > 0 && before[cube - stride];
-                *is_around |= at + 1 < count && before[cube + stride];
-            }
-            stride *= count;
-        }
-        cubes
-    }
-
-    fn holds(&self, place: &Point<D>) -> bool {
-        self.are_around[self.cube(place)]
-    }
-
-    /// The number of the cube of a place; of one outside, the nearest.
-    fn cube(&self, place: &Point<D>) -> usize {
-        (0..D).rev().fold(0, |index, k| {
-            let at = ((place[k] - self.min[k]) / self.width).max(0.0) as usize;
-            index * self.shape[k] + at.min(self.shape[k] - 1)
-        })
+        let (rise, bend) = (0.5 * (after - before), before - 2.0 * here + after);
+        let offset = -rise / bend;
+        let bottom = here + 0.5 * rise * offset;
+        let is_near = bend >= LEAST_BEND && offset.abs() * ACROSS <= within;
+        (is_near && -bottom > self.least_depth).then_some(bottom)
     }
 }
 
@@ -311,7 +255,6 @@ fn each_middle<const D: usize>(parts: usize, mut visit: impl FnMut([f64; D])) {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use proptest::prelude::*;
 
     fn middles_make_the_mean_of_a_plane_exact<const D: usize>() {
         // the mean of a linear function is its value at the centroid, 1 / D for every weight
@@ -353,21 +296,5 @@ mod tests {
     fn the_mean_is_within_a_hundredth_of_a_fine_one() {
         near_a_fine_sum::<2>(0.5);
         near_a_fine_sum::<3>(1.0);
-    }
-
-    proptest! {
-        #[test]
-        fn places_near_a_point_are_in_cubes_that_count(
-            point in [0.0..9.0f64, 0.0..4.0, 0.0..6.0],
-            towards in [-1.0..1.0f64, -1.0..1.0, -1.0..1.0],
-            width in 0.3..3.0f64,
-        ) {
-            let bounds = Bounds { min: [0.0; 3], max: [9.0, 4.0, 6.0] };
-            let around = Around::new(&bounds, width, [point].into_iter());
-            let near = std::array::from_fn(|k| point[k] + 0.57 * width * towards[k]);
-            prop_assert!(around.holds(&bounds.clamp(&near)));
-            let far = if point[0] > 4.5 { 0.0 } else { 9.0 };
-            prop_assert!(width > 1.4 || !around.holds(&[far, point[1], point[2]]));
-        }
     }
 }

@@ -76,21 +76,25 @@ impl<const D: usize> Image<D> {
     /// [`FrameError::Crop`] if the range is empty or leaves the image.
     pub fn crop(&self, start: [usize; D], end: [usize; D]) -> Result<Self, FrameError> {
         let frame = self.frame.crop(start, end)?;
-        let shape = self.frame.shape();
-        let row = end[0] - start[0];
-        let samples = self.samples.gather(
-            frame.sample_count(),
-            (0..frame.sample_count() / row).map(|r| {
-                let (mut rest, mut index, mut stride) = (r, start[0], shape[0]);
-                for k in 1..D {
-                    let n = end[k] - start[k];
-                    index += (start[k] + rest % n) * stride;
-                    rest /= n;
-                    stride *= shape[k];
-                }
-                index..index + row
-            }),
-        );
-        Self::new(frame, samples)
+        let rows = rows(self.frame.shape(), start, end);
+        Self::new(frame, self.samples.gather(frame.sample_count(), rows))
     }
+}
+
+/// The indices of the samples from `start` (included) to `end` (excluded), row by row.
+pub(crate) fn rows<const D: usize>(
+    shape: [usize; D],
+    start: [usize; D],
+    end: [usize; D],
+) -> impl Iterator<Item = std::ops::Range<usize>> {
+    let counts: [usize; D] = std::array::from_fn(|k| end[k] - start[k]);
+    (0..counts[1..].iter().product()).map(move |row| {
+        let (mut rest, mut index, mut stride) = (row, start[0], shape[0]);
+        for k in 1..D {
+            index += (start[k] + rest % counts[k]) * stride;
+            rest /= counts[k];
+            stride *= shape[k];
+        }
+        index..index + counts[0]
+    })
 }

@@ -6,8 +6,8 @@ use crate::geometry::Point;
 use crate::watch::Watch;
 
 use super::error::RunError;
+use super::find::crests;
 use super::outcome::Outcome;
-use super::prepare::crests;
 
 /// A facet between cells on the two sides of a feature.
 #[derive(Clone, Copy, Debug, PartialEq)]

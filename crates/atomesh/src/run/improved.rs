@@ -8,7 +8,8 @@ use crate::conform::{FeatureFacet, Unmet, feature_facets, unmet};
 use crate::features::{
     FacetField, FacetTest, FacetsOfFeature, Feature, FeatureFacetOptions, find_features,
 };
-use crate::image::Samples;
+use crate::fields::{Interpolation, NominalDistance, ScalarField};
+use crate::image::{Samples, gaussian};
 use crate::improve::ImproveReport;
 use crate::mesh::Mesh;
 use crate::mirror::MirrorReport;
@@ -24,10 +25,13 @@ use super::prepared::{Parts, Prepared};
 /// The least share of features not met that is said.
 const LEAST_UNMET: f64 = 0.03;
 
-/// The least share of a facet along crests that makes it a facet of a feature, and the fewest facets of a piece of one
+/// The least depth of valleys that facets follow where atoms are not put on features, of 1.
+const FOLLOWED_DEPTH: f64 = 0.25;
+
+/// The least share of a facet along valleys that makes it a facet of a feature, and the fewest facets of a piece of one
 /// with a free end or side, in the plane and in space.
-const LEAST_FOLLOWED: f64 = 0.5;
-const LEAST_FACETS: [usize; 2] = [1, 3];
+const LEAST_FOLLOWED: f64 = 0.43;
+const LEAST_FACETS: [usize; 2] = [1, 1];
 
 /// The mesh as it stays: facets on features, no cell flat.
 #[derive(Clone, Debug)]
@@ -121,19 +125,22 @@ fn met_features<const D: usize>(
     (facets, warning)
 }
 
-/// The facets along crests of the image, where atoms were not put on these.
+/// The facets along the valleys of b that facets are measured against, where atoms were not put on these: of b smoothed by
+/// max(1, d/6) samples, deeper than a quarter.
 fn followed_features<const D: usize>(
     run: &Prepared<D>,
     mesh: &Mesh<D>,
     watch: &mut dyn Watch,
 ) -> Result<Vec<FacetsOfFeature<D>>, RunError> {
-    let Parts { grid, crests, .. } = run.parts();
-    if crests.is_empty() {
+    let Parts { grid, are_ragged, .. } = run.parts();
+    if !are_ragged {
         return Ok(Vec::new());
     }
     let step = grid.step.iter().sum::<f64>() / D as f64;
     let size = run.distance().mean();
-    let field = FacetField::on_crests(mesh, crests, step, (0.1 * size).max(step), watch)?;
+    let smooth = smoothed(run.potential(), run.distance())?;
+    let reach = (0.1 * size).max(step);
+    let field = FacetField::in_valleys(mesh, &smooth, reach, FOLLOWED_DEPTH, watch)?;
     let options = FeatureFacetOptions {
         below: -LEAST_FOLLOWED,
         test: FacetTest::Max,
@@ -143,6 +150,19 @@ fn followed_features<const D: usize>(
     let found = find_features(mesh, &field, &options)?;
     let of = |feature: Feature<D>| FacetsOfFeature { facets: feature.facets, mean: feature.mean };
     Ok(found.features.into_iter().map(of).collect())
+}
+
+/// b as smooth as its valleys are looked for.
+fn smoothed<const D: usize>(
+    potential: &ScalarField<D>,
+    distance: &NominalDistance<D>,
+) -> Result<ScalarField<D>, RunError> {
+    let grid = potential.grid();
+    let sigma = (grid.in_samples(distance.least()) / 6.0).max(1.0);
+    let mut samples = potential.samples().to_vec();
+    gaussian(&mut samples, grid.shape, grid.in_least_steps().step.map(|step| sigma / step));
+    samples.par_iter_mut().for_each(|b| *b = b.clamp(-1.0, 1.0)); // rounding
+    Ok(ScalarField::potential(*grid, samples, Interpolation::Linear)?)
 }
 
 /// The label of each cell, and what was odd about labels.

@@ -40,6 +40,7 @@ mod divided;
 mod error;
 mod estimate;
 mod filled;
+mod find;
 mod improved;
 mod inputs;
 mod method;

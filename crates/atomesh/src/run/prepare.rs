@@ -1,9 +1,7 @@
 //! From images and options to b(x), d(x) and β(x).
 
-use crate::crests::{
-    FeaturePoint, Hysteresis, Pieces, in_large_groups, linked, strongest, strongest_tenth,
-};
-use crate::enhance::{self, FeatureOptions, Features};
+use crate::crests::Pieces;
+use crate::enhance::{self, Enhanced, FeatureOptions, Features};
 use crate::fields::{
     Fields, GRADIENT_LIMIT, Grading, ImageWeight, NominalDistance, ScalarField, default_distance,
 };
@@ -13,32 +11,11 @@ use crate::region::{Outline, label_samples, samples_inside};
 use crate::watch::{Phase, Watch, check};
 
 use super::error::{RunError, Warning};
+use super::find::{Found, Known, find_features};
 use super::inputs::Inputs;
 use super::method::Method;
 use super::options::{MeshKind, MeshOptions, Size};
 use super::prepared::{Parts, Prepared};
-
-/// The least square of the deviation by which b is smoothed to find valleys, in samples; together with a sample that b
-/// has already it is max(1, d/6).
-const LEAST_VARIANCE: f64 = 0.8;
-/// The least depth of a valley at all, and over that of the deepest tenth.
-const LEAST_DEPTH: f32 = 0.05;
-const DEPTH_SHARE: f32 = 0.3;
-
-/// The least depth of valleys that facets follow where atoms are not put on features, of 1.
-const FOLLOWED_DEPTH: f32 = 0.25;
-
-/// The depth that a group of bottoms reaches somewhere, over that of the deepest tenth. On a section of faults the
-/// groups of clutter reach 0.4, those of faults 0.48 and more.
-const GROUP_DEPTH_SHARE: f64 = 0.45;
-/// The least length of a piece of a feature in the plane, over d, in points a sample apart; in space its least area,
-/// over d².
-const LEAST_PIECE: [f64; 2] = [1.5, 6.0];
-
-/// The least share of points on clean features with which atoms are put on features unasked. Discs, balls and faults
-/// that are planes have 0.75 and more, a photograph of faults 0.39, brains and torsos 0.56 and 0.64: of the features of
-/// these fewer are met by rows of atoms of their own than by facets that turn onto them.
-const LEAST_CLEAN: f64 = 0.7;
 
 /// Makes b(x), d(x) and β(x).
 pub(super) fn prepare<const D: usize>(
@@ -57,7 +34,8 @@ pub(super) fn prepare<const D: usize>(
     method.crystal(options.lattice)?; // refuse early what does not fit the dimension
     let mut warnings = Vec::new();
     let labels = labels(&inputs)?;
-    let mut samples = potential_samples(&inputs, &options, &mut warnings, watch)?;
+    let Enhanced { values: mut samples, crests, .. } =
+        enhanced(&inputs, &options, &mut warnings, watch)?;
     check(watch, Phase::Distance, 0.0, None)?;
     let distance = nominal_distance(&inputs, &grid, &options, &samples)?;
     let outline = outline(&inputs, grid, &distance, watch)?;
@@ -78,7 +56,10 @@ pub(super) fn prepare<const D: usize>(
         match why_not(&options, &grid, &distance, is_masked) {
             Some(why) if asked == Align::Conform => warnings.push(Warning::NotConforming { why }),
             Some(_) => {}
-            None => found = find_features(&inputs, &options, &potential, &distance, watch)?,
+            None => {
+                let known = Known { potential: &potential, distance: &distance, crests };
+                found = find_features(&inputs, &options, known, watch)?;
+            }
         }
         options.improve.align = if found.pieces.is_some() { Align::Conform } else { Align::Full };
     }
@@ -95,7 +76,7 @@ pub(super) fn prepare<const D: usize>(
         is_potential: inputs.is_potential,
         warnings,
         pieces: found.pieces,
-        crests: found.crests,
+        are_ragged: found.are_ragged,
         faced,
     }))
 }
@@ -128,14 +109,16 @@ fn find_faced<const D: usize>(
     watch: &mut dyn Watch,
 ) -> Result<Option<Pieces<D>>, RunError> {
     if inputs.is_potential {
-        return Ok(find_features(inputs, options, potential, distance, watch)?.pieces);
+        let known = Known { potential, distance, crests: None };
+        return Ok(find_features(inputs, options, known, watch)?.pieces);
     }
     let features = FeatureOptions { repel: false, ..options.features };
     let attracting = MeshOptions { kind: MeshKind::Delaunay, features, ..options.clone() };
     // what is odd about it has been said
-    let samples = potential_samples(inputs, &attracting, &mut Vec::new(), watch)?;
-    let narrow = ScalarField::potential(*potential.grid(), samples, options.interpolation)?;
-    Ok(find_features(inputs, &attracting, &narrow, distance, watch)?.pieces)
+    let Enhanced { values, crests, .. } = enhanced(inputs, &attracting, &mut Vec::new(), watch)?;
+    let narrow = ScalarField::potential(*potential.grid(), values, options.interpolation)?;
+    let known = Known { potential: &narrow, distance, crests };
+    Ok(find_features(inputs, &attracting, known, watch)?.pieces)
 }
 
 /// Where the mesh ends, if there is a mask and it does not hold the whole box.
@@ -188,120 +171,16 @@ fn why_not<const D: usize>(
     (distance.least() < mean_step).then_some("edges are shorter than the mean step of samples")
 }
 
-/// Features that facets are to follow.
-#[derive(Default)]
-struct Found<const D: usize> {
-    /// Atoms are put on these.
-    pieces: Option<Pieces<D>>,
-    /// Facets are turned onto these, which are too ragged for rows of atoms.
-    crests: Vec<FeaturePoint<D>>,
-}
-
-/// The features, in lattice coordinates.
-fn find_features<const D: usize>(
-    inputs: &Inputs<'_, D>,
-    options: &MeshOptions<D>,
-    potential: &ScalarField<D>,
-    distance: &NominalDistance<D>,
-    watch: &mut dyn Watch,
-) -> Result<Found<D>, RunError> {
-    let grid = potential.grid();
-    let kinds: Vec<FeatureOptions> = match &options.mixture {
-        _ if inputs.is_potential => Vec::new(),
-        Some(mixture) => (mixture.shares().iter())
-            .map(|share| FeatureOptions { features: share.features, ..options.features })
-            .collect(),
-        None => vec![options.features],
-    };
-    let mut points = Vec::new();
-    let mut is_valley = inputs.is_potential;
-    for kind in kinds {
-        let kind = FeatureOptions { units: options.units, ..kind };
-        match enhance::feature_points(image_of(inputs, kind.features), &kind, watch)? {
-            Some(found) => points.extend(found),
-            None => is_valley |= kind.features != Features::None,
-        }
-    }
-    if is_valley {
-        points.extend(deep_valleys(potential, distance, options.features.repel, watch)?);
-    }
-    if options.improve.align == Align::Auto && Pieces::clean_share(&points, grid) < LEAST_CLEAN {
-        let crests = wide_valleys(potential, distance, watch)?;
-        return Ok(Found { crests, pieces: None });
-    }
-    let pieces = Pieces::new(points, grid, least_piece(grid, distance));
-    Ok(Found { pieces: (!pieces.is_empty()).then_some(pieces), crests: Vec::new() })
-}
-
-/// The valleys of b that facets are measured against: of b smoothed by max(1, d/6) samples, deeper than a quarter, and in
-/// large groups; in lattice coordinates.
-fn wide_valleys<const D: usize>(
-    potential: &ScalarField<D>,
-    distance: &NominalDistance<D>,
-    watch: &mut dyn Watch,
-) -> Result<Vec<FeaturePoint<D>>, RunError> {
-    let grid = potential.grid();
-    let size = grid.in_samples(distance.least());
-    let sigma = (size / 6.0).max(1.0);
-    let found = enhance::valley_points(potential.samples(), grid, sigma, FOLLOWED_DEPTH, watch)?;
-    Ok(in_large_groups(found, grid.shape, size))
-}
-
-/// The crests of all deep valleys of b, or of −b where features repel, as pieces; clean or not.
-pub(super) fn crests<const D: usize>(
-    potential: &ScalarField<D>,
-    distance: &NominalDistance<D>,
-    repels: bool,
-    watch: &mut dyn Watch,
-) -> Result<Pieces<D>, RunError> {
-    let points = deep_valleys(potential, distance, repels, watch)?;
-    Ok(Pieces::new(points, potential.grid(), least_piece(potential.grid(), distance)))
-}
-
-/// The fewest points of a piece of a feature.
-fn least_piece<const D: usize>(grid: &Grid<D>, distance: &NominalDistance<D>) -> usize {
-    let size = grid.in_samples(distance.least());
-    (LEAST_PIECE[D - 2] * size.powi(D as i32 - 1)).ceil() as usize
-}
-
-/// The bottoms of the deep valleys of b, or of −b where features repel, in lattice coordinates.
-fn deep_valleys<const D: usize>(
-    potential: &ScalarField<D>,
-    distance: &NominalDistance<D>,
-    repels: bool,
-    watch: &mut dyn Watch,
-) -> Result<Vec<FeaturePoint<D>>, RunError> {
-    let grid = potential.grid();
-    let (low, high) = potential.range();
-    if (if repels { -high } else { low }) > -LEAST_DEPTH {
-        return Ok(Vec::new());
-    }
-    let turned: Vec<f32>;
-    let valleys = match repels {
-        true => {
-            turned = potential.samples().iter().map(|b| -b).collect();
-            &turned[..]
-        }
-        false => potential.samples(),
-    };
-    let size = grid.in_samples(distance.least());
-    let sigma = ((size / 6.0).powi(2) - 1.0).max(LEAST_VARIANCE).sqrt();
-    let found = enhance::valley_points(valleys, grid, sigma, LEAST_DEPTH, watch)?;
-    let found = in_large_groups(strongest(found, DEPTH_SHARE), grid.shape, size);
-    let high = GROUP_DEPTH_SHARE * f64::from(strongest_tenth(&found));
-    let limits = Hysteresis { low: 0.0, high, least_count: 0 };
-    Ok(linked(found, grid.shape, limits))
-}
-
 /// b at the samples: enhanced, or as given.
-fn potential_samples<const D: usize>(
+fn enhanced<const D: usize>(
     inputs: &Inputs<'_, D>,
     options: &MeshOptions<D>,
     warnings: &mut Vec<Warning>,
     watch: &mut dyn Watch,
-) -> Result<Vec<f32>, RunError> {
+) -> Result<Enhanced<D>, RunError> {
     if inputs.is_potential {
-        return Ok(enhance::given_potential(inputs.image.samples().clone())?);
+        let values = enhance::given_potential(inputs.image.samples().clone())?;
+        return Ok(Enhanced { values, constant: false, crests: None });
     }
     let smooth = options.features.smooth.or_else(|| width_for_faces(inputs, options));
     let features = FeatureOptions { units: options.units, smooth, ..options.features };
@@ -313,7 +192,7 @@ fn potential_samples<const D: usize>(
     if enhanced.constant {
         warnings.push(Warning::Constant);
     }
-    Ok(enhanced.values)
+    Ok(enhanced)
 }
 
 /// How wide a potential that repels is made for Voronoi cells, where no width is asked for: a quarter of the
@@ -337,7 +216,7 @@ fn width_for_faces<const D: usize>(
 }
 
 /// The image that features of a kind are looked for in.
-fn image_of<'a, const D: usize>(inputs: &Inputs<'a, D>, kind: Features) -> &'a Image<D> {
+pub(super) fn image_of<'a, const D: usize>(inputs: &Inputs<'a, D>, kind: Features) -> &'a Image<D> {
     match (inputs.labels, kind) {
         (Some(labels), Features::Labels) => labels,
         _ => inputs.image,

@@ -4,7 +4,7 @@ use std::fmt;
 use std::sync::Arc;
 
 use crate::conform::are_on_pieces;
-use crate::crests::{FeaturePoint, Pieces};
+use crate::crests::Pieces;
 use crate::fields::{Fields, FieldsView, Interpolation, NominalDistance, ScalarField};
 use crate::geometry::{Bounds, Point, compact_order};
 use crate::image::{Frame, Grid, Samples};
@@ -47,8 +47,8 @@ pub(super) struct Parts<const D: usize> {
     pub warnings: Vec<Warning>,
     /// The features that facets are made to keep to.
     pub pieces: Option<Pieces<D>>,
-    /// Points on the features that facets are turned onto, in lattice coordinates, where no pieces are kept to.
-    pub crests: Vec<FeaturePoint<D>>,
+    /// Whether features were found too ragged to be kept to, so that facets are turned onto them only.
+    pub are_ragged: bool,
     /// The features that faces of Voronoi cells are made to fall on.
     pub faced: Option<Pieces<D>>,
 }

@@ -18,10 +18,10 @@ use super::outcome::{lattice_mesh, sides};
 use super::report::MeshReport;
 
 type EnhanceImage<const D: usize> =
-    fn(&Image<D>, &FeatureOptions, &mut dyn Watch) -> Result<Enhanced, EnhanceError>;
+    fn(&Image<D>, &FeatureOptions, &mut dyn Watch) -> Result<Enhanced<D>, EnhanceError>;
 
 type EnhanceMixture<const D: usize> =
-    fn(&Mixture, &FeatureOptions, &Image<D>, &mut dyn Watch) -> Result<Enhanced, EnhanceError>;
+    fn(&Mixture, &FeatureOptions, &Image<D>, &mut dyn Watch) -> Result<Enhanced<D>, EnhanceError>;
 
 type FieldAlong<const D: usize> =
     fn(&Mesh<D>, &ScalarField<D>, &mut dyn Watch) -> Result<FacetField<D>, FeaturesError>;

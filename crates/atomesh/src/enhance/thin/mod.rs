@@ -22,7 +22,7 @@ pub use faults::FaultOptions;
 pub use horizons::HorizonOptions;
 pub use options::{CrestOptions, Polarity};
 
-use super::{EnhanceError, Enhanced, FeatureOptions, Features};
+use super::{EnhanceError, Enhanced, FeatureOptions, Features, to_lattice};
 use crate::crests::{FeaturePoint, Hysteresis, linked, widen};
 use crate::image::{Grid, Image, Samples};
 use crate::watch::{Phase, Watch, check};
@@ -105,20 +105,21 @@ pub(super) fn thinned<const D: usize>(
     image: &Image<D>,
     options: &FeatureOptions,
     watch: &mut dyn Watch,
-) -> Result<Enhanced, EnhanceError> {
+) -> Result<Enhanced<D>, EnhanceError> {
     let grid = image.frame().grid(options.units);
     let width = match options.smooth {
         Some(width) if width > 0.0 => width,
         _ => WIDTH * D as f64 * grid.least_step(),
     };
-    let crests = crest_points(image, options, watch)?;
+    let mut crests = crest_points(image, options, watch)?;
     check(watch, Phase::Potential, 0.9, None)?;
     let mut values = widen(&crests, &grid, width);
     if options.repel {
         values.par_iter_mut().for_each(|b| *b = -*b + 0.0); // no −0
     }
     check(watch, Phase::Potential, 1.0, None)?;
-    Ok(Enhanced { values, constant: crests.is_empty() })
+    to_lattice(&mut crests, &grid);
+    Ok(Enhanced { values, constant: crests.is_empty(), crests: Some(crests) })
 }
 
 /// The crests of features that are thinned, or of edges; positions in samples, normals per lattice unit.
