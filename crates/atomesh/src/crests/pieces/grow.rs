@@ -6,14 +6,16 @@ use rayon::prelude::*;
 
 use super::super::{Bins, FeaturePoint, PointGrid};
 use super::link::{Alike, later_neighbours};
+use super::meet::fill_in;
 use crate::geometry::{Bounds, Sets, difference, dot};
 
 /// Points this near to a piece's are explained by it, in mean steps; and those in the flank of its valley, where noise
 /// makes valleys of its own: as near as this, and weaker by this.
 const EXPLAINED: f64 = 1.6;
-/// In space a piece explains points as far as this, in mean steps, that are so near to its plane: where sheets cross, what
-/// lies between the two.
+/// A piece explains points as far as this, in mean steps, that are so near to its plane: where sheets cross, what lies
+/// between the two, and where a line ends, the fan of valleys about its tip, which is wider by a share of their distance.
 const EXPLAINED_ALONG: f64 = 4.5;
+const FAN: f64 = 0.3;
 const FLANK: f64 = 3.5;
 const WEAKER: f64 = 0.6;
 /// A piece is one layer: within this, in mean steps, no point of it stands beside another, above its plane by more than
@@ -32,7 +34,8 @@ pub(super) fn add_rest<const D: usize>(
     reach: f64,
     step: f64,
 ) {
-    let rest = unexplained(points, rest, bounds, step);
+    let (rest, explained) = unexplained(points, rest, bounds, step);
+    fill_in(points, sets, &explained, bounds, step);
     let alike = Alike { reach, cosine: 0.8, slope: 0.4, slack: 0.35 };
     let mut around = vec![Vec::new(); rest.len()];
     for (i, later) in later_neighbours(&rest, bounds, &alike, step).into_iter().enumerate() {
@@ -80,30 +83,51 @@ pub(super) fn add_rest<const D: usize>(
     }
 }
 
-/// The points that none of `points` explains.
+/// The points that none of `points` explains, and those that some explain.
 fn unexplained<const D: usize>(
     points: &[FeaturePoint<D>],
     rest: &[FeaturePoint<D>],
     bounds: &Bounds<D>,
     step: f64,
-) -> Vec<FeaturePoint<D>> {
+) -> (Vec<FeaturePoint<D>>, Vec<FeaturePoint<D>>) {
     let grid = PointGrid::new(bounds, 2.0 * step, points.iter().map(|point| point.position));
     let (near, flank) = (EXPLAINED * step, FLANK * step);
-    let along = if D == 2 { near } else { EXPLAINED_ALONG * step };
+    let along = EXPLAINED_ALONG * step;
+    let slope = if D == 2 { FAN } else { 0.0 };
     let is_free = |point: &FeaturePoint<D>| {
         let mut is_free = true;
         grid.near(&point.position, flank.max(along), |place, i| {
             let offset = difference(place, &point.position);
             let squared = dot(&offset, &offset);
             let is_weaker = point.strength < WEAKER * points[i].strength;
-            let is_on = squared < along * along && dot(&offset, &points[i].normal).abs() < near;
+            let above = dot(&offset, &points[i].normal).abs();
+            let is_on = squared < along * along && above < near + slope * squared.sqrt();
             is_free &= squared >= near * near && !is_on && (squared >= flank * flank || !is_weaker);
         });
         is_free
     };
     let is_free: Vec<bool> = rest.par_iter().with_min_len(1 << 8).map(is_free).collect();
-    let free = rest.iter().zip(is_free).filter(|(_, is_free)| *is_free);
-    free.map(|(point, _)| *point).collect()
+    let (mut free, mut explained) = (Vec::new(), Vec::new());
+    for (point, is_free) in rest.iter().zip(is_free) {
+        if is_free { free.push(*point) } else { explained.push(*point) }
+    }
+    (free, explained)
+}
+
+/// How many points of each set stand beside others of it, as in a second layer; by root.
+pub(super) fn layered<const D: usize>(
+    points: &[FeaturePoint<D>],
+    roots: &[u32],
+    bounds: &Bounds<D>,
+    step: f64,
+) -> Vec<usize> {
+    let all = Bins::of(bounds, step, points.iter().map(|point| point.position));
+    let is_beside = |i: usize| is_beside(points, i, roots[i], roots, &all, step);
+    let are_beside: Vec<bool> =
+        (0..points.len()).into_par_iter().with_min_len(1 << 8).map(is_beside).collect();
+    let mut counts = vec![0; roots.len()];
+    roots.iter().zip(are_beside).for_each(|(&root, is)| counts[root as usize] += usize::from(is));
+    counts
 }
 
 /// Whether a point would stand beside others of a piece, as in a second layer.

@@ -5,7 +5,7 @@ use std::collections::VecDeque;
 use rayon::prelude::*;
 
 use super::super::{FeaturePoint, PointGrid};
-use super::grow::add_rest;
+use super::grow::{add_rest, layered};
 use super::meet::join_across;
 use crate::geometry::{Bounds, Point, Sets, difference, dot};
 use crate::image::Grid;
@@ -24,11 +24,14 @@ const NEXT: Next = Next { reach: 2.0, most: 0.12 };
 const NEXT_IN_SPACE: Next = Next { reach: 2.5, most: 0.12 };
 /// In space points this near to a side of the image, in mean steps, say nothing: samples mirrored there turn their normals,
 /// and sheets at a slant pass over into each other. Pieces are led on to sides.
-const AT_SIDE: f64 = 2.0;
+const AT_SIDE: f64 = 1.0;
 /// How many points are asked for the share of those on clean features.
 const ASKED: usize = 20_000;
 /// Sets of fewer points, in space of fewer than the square, are linked anew with what is left.
 const SMALL: usize = 12;
+/// Sets of which so many points stand beside others, in the plane and in space, are no single line or sheet, and are linked
+/// anew too.
+const LAYERED: [usize; 2] = [5, 150];
 /// What goes on across a place where features meet, and what over a gap. Reaches are set where they are used.
 const ACROSS: Alike = Alike { reach: 0.0, cosine: 0.96, slope: 0.08, slack: 0.4 };
 const OVER_GAPS: Alike = Alike { reach: 0.0, cosine: 0.95, slope: 0.12, slack: 0.4 };
@@ -59,7 +62,7 @@ pub(super) fn linked_pieces<const D: usize>(
     join(&mut sets, &later_neighbours(&points, &bounds, &alike, step));
     let meetings: Vec<Point<D>> = others.iter().map(|point| point.position).collect();
     join_across(&mut points, &mut sets, &meetings, &ACROSS, &bounds, step);
-    others.extend(take_small(&mut points, &mut sets));
+    others.extend(take_unclear(&mut points, &mut sets, &bounds, step));
     others.sort_by_key(|point| point.index);
     add_rest(&mut points, &mut sets, &others, &bounds, reach, step);
     join_across(&mut points, &mut sets, &[], &OVER_GAPS, &bounds, step);
@@ -84,21 +87,27 @@ fn off_sides<const D: usize>(
     points
 }
 
-/// Takes out the points of sets too small to say how a feature goes on.
-fn take_small<const D: usize>(
+/// Takes out the points of sets too small to say how a feature goes on, and of those that are no single line or sheet.
+fn take_unclear<const D: usize>(
     points: &mut Vec<FeaturePoint<D>>,
     sets: &mut Sets,
+    bounds: &Bounds<D>,
+    step: f64,
 ) -> Vec<FeaturePoint<D>> {
     let roots = sets.roots();
     let mut counts = vec![0usize; roots.len()];
     roots.iter().for_each(|&root| counts[root as usize] += 1);
     let least = SMALL.pow(D as u32 - 1);
-    let is_small = |i: usize| counts[roots[i] as usize] < least;
+    let layered = layered(points, &roots, bounds, step);
+    let is_unclear = |i: usize| {
+        let root = roots[i] as usize;
+        counts[root] < least || layered[root] >= LAYERED[D - 2]
+    };
     let (mut kept, mut small) = (Vec::new(), Vec::new());
     let mut kept_sets = Sets::default();
     let mut number = vec![u32::MAX; roots.len()];
     for (i, point) in points.drain(..).enumerate() {
-        if is_small(i) {
+        if is_unclear(i) {
             small.push(point);
             continue;
         }

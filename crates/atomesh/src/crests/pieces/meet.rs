@@ -20,6 +20,16 @@ const LOPSIDED: f64 = 1.2;
 const SPARSE: f64 = 1.5;
 /// How far the points between joined pieces are apart, in mean steps.
 const FILL: f64 = 0.8;
+/// How far from a piece's nearest point, and how far above its plane, a point is that it is led on to, in mean steps.
+const FILLED: f64 = 4.5;
+const ABOVE: f64 = 1.6;
+/// Where the mean of the points within that distance is farther than this, in mean steps, a piece has ended: at its border
+/// it is 1.9.
+const OUTSIDE: f64 = 2.8;
+/// How often lines are led on at their ends, and the least strength there, over that of the line: half of it is where a
+/// blurred line ends, and a line goes on by a step beyond its last point.
+const LED_OUT: usize = 6;
+const AT_END: f64 = 0.7;
 
 /// An end of a piece.
 struct End<const D: usize> {
@@ -147,6 +157,109 @@ fn evened<const D: usize>(
     FeaturePoint { normal: sum.map(|x| x / length), ..point }
 }
 
+/// A piece beside a point that it explains.
+struct Beside<const D: usize> {
+    root: u32,
+    /// The squared distance of its nearest point, and the number of that.
+    nearest: (f64, usize),
+    /// The sum of the ways to its points within reach, and how many these are.
+    sum: Point<D>,
+    count: f64,
+}
+
+/// Adds points to pieces where they have none, but points that they explain: where sheets cross, at their rims, and at the
+/// ends of lines. Each is put onto the planes of the pieces that are near it.
+pub(super) fn fill_in<const D: usize>(
+    points: &mut Vec<FeaturePoint<D>>,
+    sets: &mut Sets,
+    explained: &[FeaturePoint<D>],
+    bounds: &Bounds<D>,
+    step: f64,
+) {
+    let rounds = if D == 2 { LED_OUT } else { 1 };
+    for _ in 0..rounds {
+        let count = points.len();
+        fill_once(points, sets, explained, bounds, step);
+        if points.len() == count {
+            return;
+        }
+    }
+}
+
+/// One round of [`fill_in`], which leads an end on by a step or so.
+fn fill_once<const D: usize>(
+    points: &mut Vec<FeaturePoint<D>>,
+    sets: &mut Sets,
+    explained: &[FeaturePoint<D>],
+    bounds: &Bounds<D>,
+    step: f64,
+) {
+    let roots = sets.roots();
+    let grid = PointGrid::new(bounds, 1.5 * step, points.iter().map(|point| point.position));
+    let reach = FILLED * step;
+    let places = |point: &FeaturePoint<D>| {
+        let mut beside: Vec<Beside<D>> = Vec::new();
+        grid.near(&point.position, reach, |place, i| {
+            let offset = difference(place, &point.position);
+            let squared = dot(&offset, &offset);
+            if squared > reach * reach {
+                return;
+            }
+            let root = roots[i];
+            let at = beside.iter().position(|piece| piece.root == root).unwrap_or_else(|| {
+                beside.push(Beside { root, nearest: (squared, i), sum: [0.0; D], count: 0.0 });
+                beside.len() - 1
+            });
+            let piece = &mut beside[at];
+            piece.nearest = if (squared, i) < piece.nearest { (squared, i) } else { piece.nearest };
+            (0..D).for_each(|k| piece.sum[k] += offset[k]);
+            piece.count += 1.0;
+        });
+        beside.sort_unstable_by_key(|piece| piece.root);
+        let on_plane = |piece: Beside<D>| {
+            let i = piece.nearest.1;
+            let plane = evened(i, points, &roots, &grid, step);
+            let above = dot(&difference(&point.position, &plane.position), &plane.normal);
+            let is_faint = D == 2 && point.strength < AT_END * points[i].strength;
+            let is_off = is_faint || above.abs() > ABOVE * step;
+            if is_off || dot(&piece.sum, &piece.sum).sqrt() > OUTSIDE * step * piece.count {
+                return None;
+            }
+            let position = std::array::from_fn(|k| point.position[k] - above * plane.normal[k]);
+            let strength = points[i].strength;
+            Some((i as u32, FeaturePoint { index: point.index, position, strength, ..plane }))
+        };
+        beside.into_iter().filter_map(on_plane).collect::<Vec<_>>()
+    };
+    let found: Vec<_> = explained.par_iter().with_min_len(1 << 6).map(places).collect();
+    let mut bins = Bins::of(bounds, step, points.iter().map(|point| point.position));
+    for (i, point) in found.into_iter().flatten() {
+        add_apart(points, sets, &mut bins, i, point, FILL * step);
+    }
+}
+
+/// Adds a point to the set of point `i`, if none of the set is nearer to it than `spacing`.
+fn add_apart<const D: usize>(
+    points: &mut Vec<FeaturePoint<D>>,
+    sets: &mut Sets,
+    bins: &mut Bins<D>,
+    i: u32,
+    point: FeaturePoint<D>,
+    spacing: f64,
+) {
+    let (mut is_free, root) = (true, sets.root(i));
+    bins.near(&point.position, spacing, |k| {
+        is_free &= distance_squared(&points[k].position, &point.position) >= spacing * spacing
+            || sets.root(k as u32) != root;
+    });
+    if is_free {
+        bins.push(&point.position);
+        sets.push();
+        sets.join(i, points.len() as u32);
+        points.push(point);
+    }
+}
+
 /// Adds points between joined pieces, in the sets of the pieces.
 fn fill<const D: usize>(
     points: &mut Vec<FeaturePoint<D>>,
@@ -158,7 +271,10 @@ fn fill<const D: usize>(
     let spacing = FILL * step;
     let mut bins = Bins::of(bounds, step, points.iter().map(|point| point.position));
     for &[i, j] in bridges {
-        let (a, b) = (points[i as usize], points[j as usize]);
+        let (a, mut b) = (points[i as usize], points[j as usize]);
+        if dot(&a.normal, &b.normal) < 0.0 {
+            b.normal = b.normal.map(|n| -n); // finders leave the sign open
+        }
         let length = distance_squared(&a.position, &b.position).sqrt();
         let count = (length / spacing) as usize + 1;
         for n in 1..count {
@@ -168,24 +284,13 @@ fn fill<const D: usize>(
             };
             let (position, normal) = (mix(&a.position, &b.position), mix(&a.normal, &b.normal));
             let length = dot(&normal, &normal).sqrt();
-            let normal = normal.map(|x| x / length);
-            let mut is_free = true;
-            let root = sets.root(i);
-            bins.near(&position, spacing, |k| {
-                is_free &= distance_squared(&points[k].position, &position) >= spacing * spacing
-                    || sets.root(k as u32) != root;
-            });
-            if is_free {
-                bins.push(&position);
-                sets.push();
-                sets.join(i, points.len() as u32);
-                points.push(FeaturePoint {
-                    index: a.index,
-                    position,
-                    normal,
-                    strength: (1.0 - t) * a.strength + t * b.strength,
-                });
-            }
+            let point = FeaturePoint {
+                index: a.index,
+                position,
+                normal: normal.map(|x| x / length),
+                strength: (1.0 - t) * a.strength + t * b.strength,
+            };
+            add_apart(points, sets, &mut bins, i, point, spacing);
         }
     }
 }

@@ -33,9 +33,9 @@ const COARSE: f64 = 4.0;
 /// How often a foot is looked for on the patch nearest to the last.
 const FOOT_ROUNDS: usize = 3;
 /// How far from the nearest point of a piece a place may be along the piece and still be on it, in mean steps: in the
-/// image, and within this of the image's sides, where filters see too little.
+/// image, and within this of the image's sides, where filters see too little, in the plane and in space.
 const END: f64 = 1.2;
-const END_AT_SIDE: f64 = 6.0;
+const END_AT_SIDE: [f64; 2] = [6.0, 4.0];
 /// How far from its nearest point a piece is looked for, in mean steps.
 const GREATEST_GAP: f64 = 26.0;
 /// A point is at the end or border of its piece if the mean of the points within some steps is farther than this.
@@ -172,7 +172,7 @@ impl<const D: usize> Pieces<D> {
 
     /// How far pieces are led on to the sides of the box, in mean steps.
     pub(crate) fn led_on(&self) -> f64 {
-        END_AT_SIDE
+        END_AT_SIDE[D - 2]
     }
 
     /// All points, with the piece of each.
@@ -272,10 +272,10 @@ impl<const D: usize> Pieces<D> {
 
     /// How far from its nearest point a piece still is at `x`.
     fn end_at(&self, x: &Point<D>) -> f64 {
-        let near = END_AT_SIDE * self.step;
+        let near = END_AT_SIDE[D - 2] * self.step;
         let is_at_side =
             (0..D).any(|k| x[k] < self.bounds.min[k] + near || x[k] > self.bounds.max[k] - near);
-        self.step * if is_at_side { END_AT_SIDE } else { END }
+        self.step * if is_at_side { END_AT_SIDE[D - 2] } else { END }
     }
 
     /// Whether a piece has a point within `reach` of `x`: not so where it was led on.
@@ -471,6 +471,40 @@ mod tests {
         assert!((foot.position[1] - 20.4).abs() < 1e-6);
         assert_eq!(pieces.near(&[20.0, 22.0], 3.0), [0]);
         assert!(pieces.near(&[55.0, 4.0], 1.0).is_empty());
+    }
+
+    #[test]
+    fn a_line_that_forks_is_two_pieces_of_one_layer_each() {
+        let grid = Grid { shape: [100, 60], step: [STEP; 2] };
+        let mut points = line(&grid, [50.0, 30.2], [0.0, 1.0]);
+        // a branch rises by a twelfth from x = 40 on
+        let slant = [-1.0 / 145f64.sqrt(), 12.0 / 145f64.sqrt()];
+        let branch = line(&grid, [40.0, 30.2], slant);
+        points.extend(branch.into_iter().filter(|p| p.position[0] > 52.0));
+        let pieces = Pieces::new(points, &grid, 10);
+        assert_eq!(pieces.len(), 2);
+        for (point, piece) in pieces.points() {
+            let beside = pieces.points().any(|(other, of)| {
+                let offset = difference(&other.position, &point.position);
+                of == piece && offset[1].abs() > 1.5 && offset[0].abs() < 1.0
+            });
+            assert!(!beside, "{:?}", point.position);
+        }
+    }
+
+    #[test]
+    fn points_between_joined_pieces_are_turned_as_these_whatever_their_signs() {
+        let grid = Grid { shape: [60, 40], step: [STEP; 2] };
+        let mut points = line(&grid, [30.0, 20.4], [0.0, 1.0]);
+        points.retain(|p| !(29.5..31.5).contains(&p.position[0]));
+        for point in &mut points {
+            let sign = if point.position[0] < 30.0 { 1.0 } else { -1.0 };
+            point.normal = [0.0, sign];
+        }
+        let pieces = Pieces::new(points, &grid, 10);
+        assert_eq!(pieces.len(), 1);
+        assert!(pieces.points().any(|(p, _)| (29.5..31.5).contains(&p.position[0])));
+        assert!(pieces.points().all(|(p, _)| p.normal[1].abs() > 0.999));
     }
 
     #[test]
