@@ -136,6 +136,7 @@ fn deepest_block<const D: usize>(potential: &ScalarField<D>) -> ([usize; D], [us
     }
     (start, end)
 }
+
 /// Points on the features, in lattice coordinates.
 fn feature_points<const D: usize>(
     inputs: &Inputs<'_, D>,

@@ -28,10 +28,8 @@ const LEAST_UNMET: f64 = 0.03;
 /// The least depth of valleys that facets follow where atoms are not put on features, of 1.
 const FOLLOWED_DEPTH: f64 = 0.25;
 
-/// The least share of a facet along valleys that makes it a facet of a feature, and the fewest facets of a piece of one
-/// with a free end or side, in the plane and in space.
+/// The least share of a facet along valleys that makes it a facet of a feature.
 const LEAST_FOLLOWED: f64 = 0.43;
-const LEAST_FACETS: [usize; 2] = [1, 1];
 
 /// The mesh as it stays: facets on features, no cell flat.
 #[derive(Clone, Debug)]
@@ -144,7 +142,7 @@ fn followed_features<const D: usize>(
     let options = FeatureFacetOptions {
         below: -LEAST_FOLLOWED,
         test: FacetTest::Max,
-        min_facets: LEAST_FACETS[D - 2],
+        min_facets: 1,
         ..FeatureFacetOptions::default()
     };
     let found = find_features(mesh, &field, &options)?;

@@ -194,8 +194,8 @@ impl<const D: usize> Outcome<D> {
     }
 
     /// The facets between cells on the two sides of a feature, whether they lie on the feature or not, without those
-    /// within 3/4 d of an end that the feature has inside the box. Where one of them is no
-    /// barrier, flow passes the feature: it is not met there. If the mesh was not made to keep to features, these are all deep valleys of b.
+    /// within 3/4 d of an end that the feature has inside the box. Where one of them is no barrier, flow passes the
+    /// feature: it is not met there. If the mesh was not made to keep to features, these are all deep valleys of b.
     ///
     /// # Errors
     /// [`RunError::Cancelled`].

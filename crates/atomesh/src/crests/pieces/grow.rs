@@ -11,10 +11,10 @@ use crate::geometry::{Bounds, Sets, difference, dot};
 
 /// Points this near to a piece's are explained by it, in mean steps; and those in the flank of its valley, where noise
 /// makes valleys of its own: as near as this, and weaker by this.
-const EXPLAINED: f64 = 1.6;
+pub(super) const EXPLAINED: f64 = 1.6;
 /// A piece explains points as far as this, in mean steps, that are so near to its plane: where sheets cross, what lies
 /// between the two, and where a line ends, the fan of valleys about its tip, which is wider by a share of their distance.
-const EXPLAINED_ALONG: f64 = 4.5;
+pub(super) const EXPLAINED_ALONG: f64 = 4.5;
 const FAN: f64 = 0.3;
 const FLANK: f64 = 3.5;
 const WEAKER: f64 = 0.6;

@@ -29,8 +29,7 @@ const AT_SIDE: f64 = 1.0;
 const ASKED: usize = 20_000;
 /// Sets of fewer points, in space of fewer than the square, are linked anew with what is left.
 const SMALL: usize = 12;
-/// Sets of which so many points stand beside others, in the plane and in space, are no single line or sheet, and are linked
-/// anew too.
+/// Sets of which so many points stand beside others, in the plane and in space, fork, and are linked again as small ones are.
 const LAYERED: [usize; 2] = [5, 150];
 /// What goes on across a place where features meet, and what over a gap. Reaches are set where they are used.
 const ACROSS: Alike = Alike { reach: 0.0, cosine: 0.96, slope: 0.08, slack: 0.4 };

@@ -5,6 +5,7 @@ use std::collections::HashSet;
 use rayon::prelude::*;
 
 use super::super::{Bins, FeaturePoint, PointGrid};
+use super::grow::{EXPLAINED, EXPLAINED_ALONG};
 use super::link::{Alike, SUPPORT};
 use crate::geometry::{Bounds, Point, Sets, difference, distance_squared, dot};
 
@@ -20,10 +21,7 @@ const LOPSIDED: f64 = 1.2;
 const SPARSE: f64 = 1.5;
 /// How far the points between joined pieces are apart, in mean steps.
 const FILL: f64 = 0.8;
-/// How far from a piece's nearest point, and how far above its plane, a point is that it is led on to, in mean steps.
-const FILLED: f64 = 4.5;
-const ABOVE: f64 = 1.6;
-/// Where the mean of the points within that distance is farther than this, in mean steps, a piece has ended: at its border
+/// Where the mean of a piece's points within [`EXPLAINED_ALONG`] is farther than this, in mean steps, a piece has ended: at its border
 /// it is 1.9.
 const OUTSIDE: f64 = 2.8;
 /// How often lines are led on at their ends, and the least strength there, over that of the line: half of it is where a
@@ -196,7 +194,7 @@ fn fill_once<const D: usize>(
 ) {
     let roots = sets.roots();
     let grid = PointGrid::new(bounds, 1.5 * step, points.iter().map(|point| point.position));
-    let reach = FILLED * step;
+    let reach = EXPLAINED_ALONG * step;
     let places = |point: &FeaturePoint<D>| {
         let mut beside: Vec<Beside<D>> = Vec::new();
         grid.near(&point.position, reach, |place, i| {
@@ -221,7 +219,7 @@ fn fill_once<const D: usize>(
             let plane = evened(i, points, &roots, &grid, step);
             let above = dot(&difference(&point.position, &plane.position), &plane.normal);
             let is_faint = D == 2 && point.strength < AT_END * points[i].strength;
-            let is_off = is_faint || above.abs() > ABOVE * step;
+            let is_off = is_faint || above.abs() > EXPLAINED * step;
             if is_off || dot(&piece.sum, &piece.sum).sqrt() > OUTSIDE * step * piece.count {
                 return None;
             }
