@@ -5,6 +5,7 @@ use std::ops::ControlFlow;
 use std::path::{Path, PathBuf};
 use std::time::{Duration, Instant};
 
+use atomesh::run::Warning;
 use atomesh::watch::{Phase, Watch};
 
 /// Listens to a job: to more than a [`Watch`] does.
@@ -94,6 +95,12 @@ impl<'w> Session<'w> {
             file: file.map(Path::to_path_buf),
             text: text.to_string(),
         });
+    }
+
+    /// What is odd about a run, as a warning or a note.
+    pub(crate) fn say(&mut self, file: Option<&Path>, warning: &Warning) {
+        let (is_warning, text) = (!warning.is_note(), warning.to_string());
+        self.note(Note { is_warning, file: file.map(Path::to_path_buf), text });
     }
 
     pub(crate) fn note(&mut self, note: Note) {

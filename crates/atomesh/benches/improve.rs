@@ -39,7 +39,7 @@ fn benches(criterion: &mut Criterion) {
             let improve = || {
                 SpaceImprover.improve(
                     mesh.clone(),
-                    Held { freedom: &freedom, facets: &[] },
+                    Held { freedom: &freedom, facets: &[], near: None },
                     fields,
                     &options,
                     &mut Silent,

@@ -51,7 +51,7 @@ pub fn prepare<const D: usize>(
     let prepared = atomesh::run::prepare(&dimension.method, inputs, options, session);
     let prepared = prepared.map_err(|e| refusal(run, e))?;
     for warning in prepared.warnings() {
-        session.warn(run.input.shown(), warning);
+        session.say(run.input.shown(), warning);
     }
     Ok((prepared, images.image))
 }
@@ -81,7 +81,7 @@ pub(crate) fn meshed<const D: usize>(
     let said = prepared.warnings().len();
     let outcome = prepared.run(session).map_err(|e| refusal(run, e))?;
     for warning in &outcome.warnings()[said..] {
-        session.warn(run.input.shown(), warning);
+        session.say(run.input.shown(), warning);
     }
     Ok(outcome)
 }

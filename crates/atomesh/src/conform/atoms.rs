@@ -2,9 +2,9 @@
 
 use rayon::prelude::*;
 
-use crate::crests::{Bins, Foot, Pieces, PointGrid};
+use crate::crests::{Foot, Pieces};
 use crate::fields::NominalDistance;
-use crate::geometry::{Bounds, Point, difference, distance_squared, dot};
+use crate::geometry::{Bins, Bounds, Point, PointGrid, difference, distance_squared, dot};
 use crate::watch::{Cancelled, Phase, Watch, check};
 
 use super::curves::Curves;

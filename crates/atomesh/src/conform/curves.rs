@@ -2,9 +2,9 @@
 
 use rayon::prelude::*;
 
-use crate::crests::{Bins, Pieces};
+use crate::crests::Pieces;
 use crate::fields::NominalDistance;
-use crate::geometry::{Bounds, Point, difference, distance_squared, dot};
+use crate::geometry::{Bins, Bounds, Point, difference, distance_squared, dot};
 
 use super::atoms::FeatureAtom;
 use super::trace::{Curve, Cut, End, Tracer};

@@ -6,7 +6,7 @@ use crate::crests::Pieces;
 use crate::fields::NominalDistance;
 use crate::mesh::Mesh;
 
-use super::recover::{Heights, crossing_place};
+use super::recover::{crossing_place, heights};
 
 /// A corner within this of a piece is on it, in mean steps.
 const ON: f64 = 0.1;
@@ -19,7 +19,7 @@ pub fn cut_cells<const D: usize>(
     distance: &NominalDistance<D>,
 ) -> Vec<u32> {
     let points = mesh.points();
-    let heights = Heights::default().of(points, pieces, distance);
+    let heights = heights(points, pieces, distance);
     let on = ON * pieces.step();
     let crosses = |a: u32, b: u32| {
         let [of_a, of_b] = [a, b].map(|end| &heights[end as usize]);

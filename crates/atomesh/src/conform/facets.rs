@@ -8,7 +8,7 @@ use rayon::prelude::*;
 
 use crate::crests::Pieces;
 use crate::fields::NominalDistance;
-use crate::geometry::{Bounds, Point};
+use crate::geometry::{Bounds, Point, dot};
 use crate::mesh::Mesh;
 
 /// A point within this of a piece is on it, in mean steps: within the box, and on its sides, where pieces are led on.
@@ -90,32 +90,55 @@ pub fn feature_facets<const D: usize>(
         let reach = 2.0 * distance.at(&middle) + 3.0 * pieces.step();
         pieces.foot_on(piece, &middle, reach).map(|foot| foot.signed_distance(&middle))
     };
-    let facets = mesh.facets();
-    let of = |facet: &crate::mesh::Facet<D>| {
-        let first = &of_points[facet.corners[0] as usize];
-        if first.is_empty() {
-            return None;
-        }
-        let neighbour = facet.neighbour?;
-        let is_on = |piece: &u32| {
-            facet.corners[1..].iter().all(|&corner| of_points[corner as usize].contains(piece))
+    let of = |sides: &[Side<D>]| {
+        let [own, other] = sides else { return None };
+        let facet = own.corners;
+        let common = |piece: &u32| {
+            facet[1..].iter().all(|&corner| of_points[corner as usize].contains(piece))
         };
-        first.iter().copied().filter(is_on).find_map(|piece| {
-            let sides = [side(facet.cell, piece)?, side(neighbour, piece)?];
+        of_points[facet[0] as usize].iter().copied().filter(common).find_map(|piece| {
+            let sides = [side(own.cell, piece)?, side(other.cell, piece)?];
             if (sides[0] > 0.0) == (sides[1] > 0.0) {
                 return None;
             }
             // the normal of the facet as the cell has it points out of the cell
-            let at = corners(facet.cell).iter().position(|c| !facet.corners.contains(c))?;
-            let outward = mesh.facet_normal(&mesh.facet_of(facet.cell as usize, at));
-            let own = mesh.facet_normal(&facet.corners);
-            let is_outward = crate::geometry::dot(&outward, &own) > 0.0;
-            Some(FeatureFacet {
-                corners: facet.corners,
-                piece,
-                agrees: is_outward == (sides[0] < 0.0),
-            })
+            let outward = mesh.facet_normal(&mesh.facet_out_of(own.cell, &facet)?);
+            let is_outward = dot(&outward, &mesh.facet_normal(&facet)) > 0.0;
+            Some(FeatureFacet { corners: facet, piece, agrees: is_outward == (sides[0] < 0.0) })
         })
     };
-    facets.par_iter().with_min_len(1 << 8).filter_map(of).collect()
+    let sides = sides_on_pieces(mesh, &of_points);
+    let facets: Vec<&[Side<D>]> = sides.chunk_by(|a, b| a.corners == b.corners).collect();
+    facets.par_iter().with_min_len(1 << 6).filter_map(|sides| of(sides)).collect()
+}
+
+/// A facet as one of its cells has it.
+#[derive(Clone, Copy, PartialEq, Eq, PartialOrd, Ord)]
+struct Side<const D: usize> {
+    /// Its corners, ascending.
+    corners: [u32; D],
+    cell: u32,
+}
+
+/// The facets all of whose corners lie on one piece, by ascending corners and cells.
+fn sides_on_pieces<'m, const D: usize>(mesh: &'m Mesh<D>, of_points: &[Vec<u32>]) -> Vec<Side<D>> {
+    let is_on_one = &|corners: &[u32; D]| {
+        let mut common = of_points[corners[0] as usize].iter();
+        common.any(|piece| corners[1..].iter().all(|&c| of_points[c as usize].contains(piece)))
+    };
+    let of_cell = |(cell, corners): (usize, &'m [u32])| {
+        let on = corners.iter().filter(|&&corner| !of_points[corner as usize].is_empty()).count();
+        let facets = if on < D { 0 } else { D + 1 };
+        let side = (0..facets).map(move |opposite| {
+            let mut facet: [u32; D] =
+                std::array::from_fn(|k| corners[k + usize::from(k >= opposite)]);
+            facet.sort_unstable();
+            Side { corners: facet, cell: cell as u32 }
+        });
+        side.filter(move |side| is_on_one(&side.corners))
+    };
+    let cells = mesh.corners().par_chunks_exact(D + 1).enumerate().with_min_len(1 << 10);
+    let mut sides: Vec<Side<D>> = cells.flat_map_iter(of_cell).collect();
+    sides.par_sort_unstable();
+    sides
 }

@@ -14,6 +14,7 @@
 //! Nothing is random but the perturbation of the optimizer. The same at any thread count.
 
 mod atoms;
+mod connect;
 mod curves;
 mod cut;
 mod facets;
@@ -25,19 +26,19 @@ use std::collections::HashSet;
 
 use rayon::prelude::*;
 
-use crate::crests::{Bins, Pieces, PointGrid};
+use crate::crests::Pieces;
 use crate::fields::{FieldsView, NominalDistance, ScalarField};
-use crate::geometry::{Point, distance_squared};
+use crate::geometry::{Bins, Point, PointGrid, distance_squared};
+use crate::image::Grid;
 use crate::lattice::{Lattice, LatticeError, Scatterer, fill_holes};
-use crate::mesh::{ConnectError, Delaunay, Mesh};
 use crate::optimize::{OptimizeError, OptimizeOptions, OptimizeReport, optimize};
-use crate::watch::{Cancelled, Phase, Watch, check};
+use crate::watch::{Cancelled, Watch};
 
 use atoms::{FeatureAtom, feature_atoms};
+pub use connect::connect;
 pub use cut::cut_cells;
 pub(crate) use facets::are_on_pieces;
 pub use facets::{FeatureFacet, feature_facets};
-use recover::{Heights, brought_near, crossings, recovered};
 pub use unmet::{Unmet, unmet};
 
 /// The least distance of other atoms from those on features, over d: before they settle, and after.
@@ -49,10 +50,10 @@ const MET: f64 = 0.75;
 /// How far from pieces b no longer counts, over d, and in mean steps.
 const CLEARED: f64 = 0.6;
 const CLEARED_STEPS: f64 = 3.0;
+/// Planes of samples that one task clears.
+const PLANES: usize = 16;
 /// How often holes are looked for and filled.
 const FILL_ROUNDS: usize = 2;
-/// How often the atoms are connected to mend crossings.
-const RECOVER_ROUNDS: usize = 8;
 
 /// Why a lattice could not be made to conform.
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]
@@ -130,7 +131,6 @@ fn without_met<const D: usize>(
     distance: &NominalDistance<D>,
 ) -> ScalarField<D> {
     let grid = *potential.grid();
-    let mut samples = potential.samples().to_vec();
     let near_met = PointGrid::new(&grid.bounds(), distance.least(), met.iter().copied());
     let is_met = |place: &Point<D>| {
         let (reach, mut is_met) = (MET * distance.at(place), false);
@@ -139,36 +139,62 @@ fn without_met<const D: usize>(
         });
         is_met
     };
-    let between = 0.5 * pieces.apart() * pieces.step();
-    for (place, _) in pieces.places().filter(|(place, _)| is_met(place)) {
-        let reach = (CLEARED * distance.at(&place)).max(CLEARED_STEPS * pieces.step()) + between;
+    // balls about places so far apart leave nothing of what is as near to the piece as asked for
+    let ball = |place: Point<D>| {
+        let near = (CLEARED * distance.at(&place)).max(CLEARED_STEPS * pieces.step());
+        (place, near.hypot(pieces.sparse()))
+    };
+    let balls: Vec<(Point<D>, f64)> = pieces.sparse_places().filter(is_met).map(ball).collect();
+    let mut samples: Vec<f32> = potential.samples().par_iter().copied().collect();
+    let plane: usize = grid.shape[..D - 1].iter().product();
+    samples.par_chunks_mut(PLANES * plane).enumerate().for_each(|(chunk, samples)| {
+        let first = chunk * PLANES;
+        let block = Block { first, planes: samples.len() / plane, grid: &grid };
+        balls.iter().for_each(|(place, reach)| block.clear(samples, place, *reach));
+    });
+    ScalarField::potential(grid, samples, potential.interpolation())
+        .expect("values within -1 to 1, one for each sample")
+}
+
+/// Some planes of samples, of a grid.
+struct Block<'a, const D: usize> {
+    first: usize,
+    planes: usize,
+    grid: &'a Grid<D>,
+}
+
+impl<const D: usize> Block<'_, D> {
+    /// Makes the samples of the block within a ball 0.
+    fn clear(&self, samples: &mut [f32], centre: &Point<D>, reach: f64) {
+        let Grid { shape, step } = *self.grid;
+        // casts leave what is below 0 at it
+        let from = |x: f64| x.max(0.0) as usize + usize::from(x > 0.0 && x.fract() > 0.0);
+        let up_to = |x: f64| if x < 0.0 { 0 } else { x as usize + 1 };
         let range = |k: usize| {
-            let low = ((place[k] - reach) / grid.step[k]).ceil().max(0.0) as usize;
-            let high = ((place[k] + reach) / grid.step[k]).floor().max(0.0) as usize;
-            low..high.min(grid.shape[k] - 1) + 1
+            let [low, high] = [centre[k] - reach, centre[k] + reach].map(|x| x / step[k]);
+            let planes =
+                if k == D - 1 { self.first..self.first + self.planes } else { 0..shape[k] };
+            from(low).max(planes.start)..up_to(high).min(planes.end)
         };
         let ranges: [std::ops::Range<usize>; D] = std::array::from_fn(range);
         for row in 0..ranges[1..].iter().map(ExactSizeIterator::len).product() {
-            let (mut rest, mut index, mut stride) = (row, 0, grid.shape[0]);
+            let (mut rest, mut index, mut stride) = (row, 0, shape[0]);
             let mut beside = 0.0;
             for k in 1..D {
                 let at = ranges[k].start + rest % ranges[k].len();
                 rest /= ranges[k].len();
-                beside += (at as f64 * grid.step[k] - place[k]).powi(2);
-                index += at * stride;
-                stride *= grid.shape[k];
+                beside += (at as f64 * step[k] - centre[k]).powi(2);
+                index += (if k == D - 1 { at - self.first } else { at }) * stride;
+                stride *= shape[k];
             }
-            let half = (reach * reach - beside).max(0.0).sqrt();
-            let first = ((place[0] - half) / grid.step[0]).ceil().max(0.0) as usize;
-            let end = ((place[0] + half) / grid.step[0]).floor().max(-1.0) + 1.0;
-            let end = (end as usize).min(grid.shape[0]);
-            if beside <= reach * reach && first < end {
-                samples[index + first..index + end].fill(0.0);
+            if beside <= reach * reach {
+                let half = (reach * reach - beside).sqrt();
+                let first = from((centre[0] - half) / step[0]);
+                let end = up_to((centre[0] + half) / step[0]).min(shape[0]);
+                samples[index + first.min(end)..index + end].fill(0.0);
             }
         }
     }
-    ScalarField::potential(grid, samples, potential.interpolation())
-        .expect("values within -1 to 1, one for each sample")
 }
 
 /// The lattice without those atoms that may move and are too near to atoms on features.
@@ -195,35 +221,4 @@ fn without_near<const D: usize>(
     };
     let stays: Vec<bool> = (0..lattice.len()).into_par_iter().map(stays).collect();
     lattice.retained(|i| stays[i])
-}
-
-/// Connects atoms by Delaunay's rule, with atoms added and taken away until no edge crosses a feature, or nothing
-/// helps.
-///
-/// # Errors
-/// [`ConnectError`] if the atoms make no mesh, or `watch` ends the work.
-pub fn connect<const D: usize>(
-    mut lattice: Lattice<D>,
-    pieces: &Pieces<D>,
-    distance: &NominalDistance<D>,
-    delaunay: &Delaunay<D>,
-    watch: &mut dyn Watch,
-) -> Result<(Lattice<D>, Mesh<D>), ConnectError> {
-    let mut known = Heights::default();
-    for _ in 0..RECOVER_ROUNDS {
-        lattice = brought_near(lattice, pieces);
-        let mesh = delaunay.connect(lattice.atoms(), watch)?;
-        check(watch, Phase::Connect, 0.5, None)?;
-        let crossings = crossings(&mesh, pieces, distance, &mut known);
-        if crossings.is_empty() {
-            return Ok((lattice, mesh));
-        }
-        let (next, is_changed) = recovered(lattice, &crossings, pieces, distance);
-        lattice = next;
-        if !is_changed {
-            return Ok((lattice, mesh));
-        }
-    }
-    let mesh = delaunay.connect(lattice.atoms(), watch)?;
-    Ok((lattice, mesh))
 }

@@ -1,17 +1,14 @@
 //! Edges that cross features, and what is done about them.
 
-use std::collections::HashMap;
-
 use rayon::prelude::*;
 
-use crate::crests::{Bins, Pieces};
+use crate::crests::Pieces;
 use crate::fields::NominalDistance;
-use crate::geometry::{Point, distance_squared};
+use crate::geometry::{Bins, Point, distance_squared};
 use crate::lattice::Lattice;
-use crate::mesh::Mesh;
 
 use super::atoms::{ON_SIDE, onto_sides};
-use super::facets::pieces_at;
+use super::connect::Atoms;
 
 /// A new atom is as far as this from the atoms of its piece, over d.
 const CLEAR: f64 = 0.45;
@@ -40,62 +37,54 @@ pub(super) struct Crossing<const D: usize> {
     pub place: Point<D>,
 }
 
-/// How far atoms are from the pieces near them, kept from round to round: most atoms stay where they are.
-#[derive(Default)]
-pub(super) struct Heights<const D: usize>(HashMap<[u64; D], Vec<(u32, f64)>>);
-
-impl<const D: usize> Heights<D> {
-    /// The piece and the signed distance for each piece near each point.
-    pub(super) fn of(
-        &mut self,
-        points: &[Point<D>],
-        pieces: &Pieces<D>,
-        distance: &NominalDistance<D>,
-    ) -> Vec<Vec<(u32, f64)>> {
-        let key = |p: &Point<D>| p.map(f64::to_bits);
-        let unknown: Vec<Point<D>> =
-            points.iter().filter(|p| !self.0.contains_key(&key(p))).copied().collect();
-        let of = |p: &Point<D>| {
-            let reach = NEAR * distance.at(p) + 3.0 * pieces.step();
-            let height = |piece: u32| {
-                let foot = pieces.foot_on(piece, p, reach)?;
-                Some((piece, foot.signed_distance(p)))
-            };
-            let heights = pieces.near(p, reach).into_iter().filter_map(height).collect();
-            (key(p), heights)
-        };
-        let found: Vec<_> = unknown.par_iter().with_min_len(1 << 6).map(of).collect();
-        self.0.extend(found);
-        points.iter().map(|p| self.0[&key(p)].clone()).collect()
-    }
-}
-
-/// The edges that cross a piece between their ends, ascending by ends.
-pub(super) fn crossings<const D: usize>(
-    mesh: &Mesh<D>,
+/// The piece and the signed distance for each piece near each point.
+pub(super) fn heights<const D: usize>(
+    points: &[Point<D>],
     pieces: &Pieces<D>,
     distance: &NominalDistance<D>,
-    known: &mut Heights<D>,
-) -> Vec<Crossing<D>> {
-    let points = mesh.points();
-    let step = pieces.step();
-    let heights = known.of(points, pieces, distance);
-    let mut edges: Vec<[u32; 2]> = Vec::new();
-    for cell in mesh.cells() {
-        for (i, &a) in cell.iter().enumerate() {
-            for &b in &cell[..i] {
-                if is_between(&heights[a as usize], &heights[b as usize], ON * step).is_some() {
-                    edges.push([a.min(b), a.max(b)]);
-                }
-            }
-        }
-    }
+) -> Vec<Vec<(u32, f64)>> {
+    let of = |p: &Point<D>| {
+        let reach = NEAR * distance.at(p) + 3.0 * pieces.step();
+        let height = |piece: u32| {
+            let foot = pieces.foot_on(piece, p, reach)?;
+            Some((piece, foot.signed_distance(p)))
+        };
+        pieces.near(p, reach).into_iter().filter_map(height).collect()
+    };
+    points.par_iter().with_min_len(1 << 6).map(of).collect()
+}
+
+/// The edges of cells whose ends lie on two sides of a piece, ascending by ends.
+pub(super) fn edges_across<'a, const D: usize>(
+    cells: impl ParallelIterator<Item = &'a [u32]>,
+    heights: &[Vec<(u32, f64)>],
+    pieces: &Pieces<D>,
+) -> Vec<[u32; 2]> {
+    let on = ON * pieces.step();
+    let is_across =
+        |a: u32, b: u32| is_between(&heights[a as usize], &heights[b as usize], on).is_some();
+    let of = |cell: &'a [u32]| {
+        let pairs =
+            cell.iter().enumerate().flat_map(|(i, &a)| cell[..i].iter().map(move |&b| (a, b)));
+        pairs.filter(|&(a, b)| is_across(a, b)).map(|(a, b)| [a.min(b), a.max(b)])
+    };
+    let mut edges: Vec<[u32; 2]> = cells.flat_map_iter(of).collect();
     edges.par_sort_unstable();
     edges.dedup();
+    edges
+}
+
+/// The crossings of edges and pieces between the edges' ends, in the order of the edges.
+pub(super) fn crossings<const D: usize>(
+    edges: Vec<[u32; 2]>,
+    atoms: &Atoms<D>,
+    pieces: &Pieces<D>,
+) -> Vec<Crossing<D>> {
+    let on = ON * pieces.step();
     let crossing = |ends: &[u32; 2]| {
-        let [a, b] = ends.map(|end| &heights[end as usize]);
-        let (piece, heights) = is_between(a, b, ON * step)?;
-        let ends_at = ends.map(|end| &points[end as usize]);
+        let [a, b] = ends.map(|end| &atoms.heights[end as usize]);
+        let (piece, heights) = is_between(a, b, on)?;
+        let ends_at = ends.map(|end| &atoms.lattice.atoms()[end as usize]);
         let place = crossing_place(ends_at, heights, piece, pieces)?;
         Some(Crossing { ends: *ends, heights, piece, place })
     };
@@ -140,31 +129,32 @@ pub(super) fn crossing_place<const D: usize>(
     None
 }
 
+/// What is done about crossings.
+#[derive(Clone, Debug)]
+pub(super) struct Mended<const D: usize> {
+    /// Where each atom is now.
+    pub places: Vec<Point<D>>,
+    /// Whether each goes.
+    pub goes: Vec<bool>,
+    /// New atoms.
+    pub new: Vec<Point<D>>,
+}
+
 /// Brings free ends of crossing edges that are near onto the piece, or puts atoms at the crossings, where they are far
 /// enough from the piece's atoms; where nothing can be brought or put, takes away the free ends nearer to the pieces.
-/// What an edge has been mended at stays for this round. Gives the lattice and whether it has changed.
-pub(super) fn recovered<const D: usize>(
-    lattice: Lattice<D>,
+/// What an edge has been mended at stays for this round.
+pub(super) fn mended<const D: usize>(
+    atoms: &Atoms<D>,
     crossings: &[Crossing<D>],
     pieces: &Pieces<D>,
     distance: &NominalDistance<D>,
-) -> (Lattice<D>, bool) {
-    let mut mending = Mending::new(&lattice, pieces, distance);
+) -> Mended<D> {
+    let mut mending = Mending::new(atoms, pieces, distance);
     let stuck: Vec<Crossing<D>> =
         crossings.iter().filter(|crossing| !mending.mend(crossing)).copied().collect();
     let Mending { places, is_touched, new, .. } = mending;
-    let goes = ends_that_go(&lattice, &stuck, &is_touched, distance);
-    let is_changed = goes.contains(&true) || is_touched.contains(&true);
-    let is_moved: Vec<bool> =
-        (lattice.atoms().iter().zip(&places)).map(|(from, to)| from != to).collect();
-    let mut lattice = lattice.moved_to(places);
-    for i in (0..is_moved.len()).filter(|&i| is_moved[i]) {
-        lattice.set_temperature(i, 0.0);
-    }
-    let mut lattice = lattice.retained(|i| !goes[i]);
-    let bounds = *lattice.bounds();
-    new.iter().for_each(|place| lattice.push(*place, bounds.freedom(place), 0.0));
-    (lattice, is_changed)
+    let goes = ends_that_go(&atoms.lattice, &stuck, &is_touched, distance);
+    Mended { places, goes, new }
 }
 
 /// What is done about crossings, one after another.
@@ -173,7 +163,7 @@ struct Mending<'a, const D: usize> {
     pieces: &'a Pieces<D>,
     distance: &'a NominalDistance<D>,
     /// The pieces of each atom.
-    of_atoms: Vec<Vec<u32>>,
+    of_atoms: &'a [Vec<u32>],
     all: Bins<D>,
     on: OnPieces<D>,
     /// Where each atom is now.
@@ -185,16 +175,12 @@ struct Mending<'a, const D: usize> {
 }
 
 impl<'a, const D: usize> Mending<'a, D> {
-    fn new(
-        lattice: &'a Lattice<D>,
-        pieces: &'a Pieces<D>,
-        distance: &'a NominalDistance<D>,
-    ) -> Self {
-        let of_atoms = pieces_at(lattice.atoms(), pieces, lattice.bounds());
-        let atoms = lattice.atoms().iter().copied();
+    fn new(atoms: &'a Atoms<D>, pieces: &'a Pieces<D>, distance: &'a NominalDistance<D>) -> Self {
+        let Atoms { lattice, of_atoms, .. } = atoms;
+        let places = lattice.atoms().iter().copied();
         Self {
-            all: Bins::of(lattice.bounds(), distance.least(), atoms),
-            on: OnPieces::new(lattice, &of_atoms, distance),
+            all: Bins::of(lattice.bounds(), distance.least(), places),
+            on: OnPieces::new(lattice, of_atoms, distance),
             places: lattice.atoms().to_vec(),
             is_touched: vec![false; lattice.len()],
             new: Vec::new(),

@@ -2,9 +2,9 @@
 
 use rayon::prelude::*;
 
-use crate::crests::{Pieces, PointGrid};
+use crate::crests::Pieces;
 use crate::fields::NominalDistance;
-use crate::geometry::{Bounds, Point, distance_squared};
+use crate::geometry::{Bounds, Point, PointGrid, distance_squared};
 use crate::mesh::Mesh;
 
 use super::facets::FeatureFacet;

@@ -9,23 +9,19 @@
 //! Points are linked into groups, the small and weak of which are left out ([`linked`], [`in_large_groups`]).
 //! Groups become a potential again (`widen`) or evenly spaced sites for atoms (`sites`).
 
-mod bins;
 mod groups;
 mod pieces;
 mod point;
-mod point_grid;
 mod repelling;
 mod sites;
 mod valley;
 mod widen;
 
-pub(crate) use bins::Bins;
 pub(crate) use groups::strongest_tenth;
 pub use groups::{Hysteresis, in_large_groups, linked, strongest};
 pub(crate) use pieces::tangents;
-pub use pieces::{Foot, Pieces};
+pub use pieces::{Cleanness, Foot, Pieces};
 pub use point::FeaturePoint;
-pub(crate) use point_grid::PointGrid;
 pub use repelling::repelling_crests;
 pub(crate) use sites::{nearest_sites, sites};
 pub use valley::{ValleySearch, bottoms};

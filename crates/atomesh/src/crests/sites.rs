@@ -5,9 +5,9 @@
 
 use rayon::prelude::*;
 
-use super::{Bins, FeaturePoint};
+use super::FeaturePoint;
 use crate::fields::NominalDistance;
-use crate::geometry::{Bounds, distance_squared, dot};
+use crate::geometry::{Bins, Bounds, distance_squared, dot};
 use crate::watch::{Cancelled, Phase, Watch, check};
 
 /// The first distance between sites, over d. On the paper's figure 1 recall is 0.79 with 0.75, 0.80 with 0.85 and 0.77

@@ -5,9 +5,8 @@
 //! each atom). Each edit says what it changed ([`Changes`]). The mesh is always the one that connecting all atoms
 //! again would give.
 //!
-//! Cost: that of the change. The editor keeps the cells' neighbours (`cells`), and which atoms are near a place.
+//! Cost: that of the change. The editor keeps the cells' neighbours ([`Cells`]), and which atoms are near a place.
 
-mod cells;
 mod changes;
 mod error;
 mod relax;
@@ -19,14 +18,10 @@ pub use error::EditError;
 
 use std::fmt;
 
-use crate::crests::Bins;
-use crate::geometry::{Bounds, Point, distance_squared};
+use crate::geometry::{Bins, Bounds, Point, distance_squared};
 use crate::lattice::Lattice;
-use crate::mesh::{ConnectError, Delaunay, Mesh};
+use crate::mesh::{AtomEdit, CellChanges, Cells, ConnectError, Delaunay, Mesh, in_order};
 use crate::watch::Watch;
-
-use cells::{AtomEdit, Cells};
-use changes::CellChanges;
 
 /// Names an atom as long as its editor lives.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Hash)]
@@ -246,7 +241,7 @@ impl<const D: usize> Editor<D> {
     /// Cost: O(n log n).
     pub fn cells(&self) -> Vec<AtomId> {
         let mut corners: Vec<u32> = self.cells.all().flatten().copied().collect();
-        let cells = changes::in_order(&mut corners, D + 1);
+        let cells = in_order(&mut corners, D + 1);
         cells.into_iter().flatten().map(|&atom| AtomId(atom)).collect()
     }
 

@@ -1,11 +1,11 @@
 //! Optimizing the atoms around a place again.
 
-use super::cells::AtomEdit;
 use super::{Changes, EditError, Editor};
 use crate::energy::pair;
 use crate::fields::FieldsView;
 use crate::geometry::{Point, distance_squared};
 use crate::lattice::Lattice;
+use crate::mesh::AtomEdit;
 use crate::optimize::{OptimizeOptions, OptimizeReport, optimize};
 use crate::watch::Watch;
 

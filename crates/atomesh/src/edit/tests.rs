@@ -80,7 +80,7 @@ impl<const D: usize> Shadow<D> {
         let (mesh, names) = editor.mesh().unwrap();
         let cell = |corners: &[u32]| {
             let mut cell: Vec<u32> = corners.iter().map(|&c| names[c as usize].0).collect();
-            if changes::sort_by_swaps(&mut cell) {
+            if crate::mesh::sort_by_swaps(&mut cell) {
                 cell.swap(D - 1, D);
             }
             cell.into_iter().map(AtomId).collect::<Vec<AtomId>>()

@@ -5,18 +5,22 @@
 //! *Lattice coordinates* are sample indices times the grid's step (see [`crate::image::Grid`]), so
 //! sample 0 is at 0 and the box reaches to `(n − 1) · step`.
 
+mod bins;
 mod bounds;
 pub(crate) mod linear;
 mod compact;
 mod order;
+mod point_grid;
 mod predicates;
 mod sets;
 mod simplex;
+pub(crate) use bins::Bins;
 pub use bounds::Bounds;
 pub(crate) use bounds::{all_axes, axes_where};
 pub use compact::{BLOCK, compact_order};
 pub(crate) use order::shares;
 pub use order::{hilbert_order, lexicographic};
+pub(crate) use point_grid::PointGrid;
 pub use sets::Sets;
 pub use simplex::Simplex;
 

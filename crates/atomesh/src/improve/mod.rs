@@ -142,6 +142,9 @@ pub struct Held<'a, const D: usize> {
     pub freedom: &'a [u8],
     /// Facets that stay facets, corners ascending, in lexicographic order; their corners may not move.
     pub facets: &'a [[u32; D]],
+    /// Whether each point is one around which the mesh may change; around all, if there is nothing. In the plane, where all
+    /// takes little time, it is not asked.
+    pub near: Option<&'a [bool]>,
 }
 
 /// Improves meshes of one dimension.

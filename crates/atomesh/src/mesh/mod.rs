@@ -1,6 +1,8 @@
 //! Meshes: of triangles or tetrahedra ([`Mesh`]), of their second order ([`Quadratic`]), of polygons or polyhedra
 //! ([`PolyMesh`]), with named groups of facets and cells ([`Tags`]). [`Delaunay`] connects points to make them.
 
+mod cell_changes;
+mod cells;
 mod delaunay;
 mod facets;
 mod poly_mesh;
@@ -9,6 +11,10 @@ mod tags;
 mod validate;
 
 use crate::geometry::{Point, Simplex};
+#[cfg(test)]
+pub(crate) use cell_changes::sort_by_swaps;
+pub(crate) use cell_changes::{CellChanges, in_order};
+pub(crate) use cells::{AtomEdit, Cells};
 pub(crate) use delaunay::MOST_POINTS;
 pub use delaunay::{ConnectError, Delaunay, merge_duplicates};
 pub(crate) use facets::area_vector;

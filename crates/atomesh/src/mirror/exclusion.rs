@@ -1,8 +1,8 @@
 //! Where only the atoms of pairs may be.
 
-use crate::crests::{Bins, FeaturePoint, nearest_sites};
+use crate::crests::{FeaturePoint, nearest_sites};
 use crate::fields::NominalDistance;
-use crate::geometry::{Bounds, Point, distance_squared};
+use crate::geometry::{Bins, Bounds, Point, distance_squared};
 
 use super::pairs::Pairs;
 

@@ -1,8 +1,8 @@
 //! Pairs of atoms that are mirror images of each other in a feature.
 
-use crate::crests::{Bins, FeaturePoint};
+use crate::crests::FeaturePoint;
 use crate::fields::NominalDistance;
-use crate::geometry::{Bounds, Point, difference, distance_squared, dot};
+use crate::geometry::{Bins, Bounds, Point, difference, distance_squared, dot};
 use crate::lattice::Lattice;
 
 use super::{APART, is_held};

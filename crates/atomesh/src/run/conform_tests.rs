@@ -230,6 +230,30 @@ fn what_cannot_conform_is_said() {
         assert!(matches!(warnings(image, options)[..], [Warning::NotConforming { .. }]));
     }
     assert_eq!(warnings(&image, conforming(5.0)), []);
+    // where nobody asked, it is a note
+    let auto = |options: MeshOptions<2>| MeshOptions {
+        improve: ImproveOptions { align: Align::Auto, ..options.improve },
+        ..options
+    };
+    let [note] = &warnings(&coarse, auto(conforming(1.5)))[..] else { panic!() };
+    assert!(note.is_note() && matches!(note, Warning::TurnedOnly { .. }), "{note}");
+    assert_eq!(warnings(&image, auto(conforming(5.0))), []);
+}
+
+#[test]
+fn a_short_line_is_followed_though_most_of_its_points_are_at_its_tips() {
+    let short = image([90, 80], |p| {
+        let along = |x: f64| 1.0 / (1.0 + (-1.7 * x / 1.2).exp());
+        let across = (-0.5 * ((p[1] - 40.3) / 1.2).powi(2)).exp();
+        -across * along(p[0] - 34.6) * along(57.2 - p[0])
+    });
+    let options = MeshOptions {
+        improve: ImproveOptions { align: Align::Auto, ..ImproveOptions::for_dimension(2) },
+        ..conforming(4.0, Features::Dark)
+    };
+    let prepared = prepare(&Method::plane(), Inputs::image(&short), options, &mut Silent).unwrap();
+    assert_eq!(prepared.pieces().map(crate::crests::Pieces::len), Some(1));
+    assert_eq!(prepared.warnings(), []);
 }
 
 /// Lines of random slants and places, so near to each other that no rows of atoms fit between.
@@ -256,6 +280,7 @@ fn facets_along_ragged_features_are_tagged_though_no_atoms_were_put_on_these() {
     };
     let outcome = run(&Method::plane(), &thicket(), options.clone());
     assert!(outcome.run().pieces().is_none());
+    assert!(matches!(outcome.warnings(), [Warning::TurnedOnly { why }] if why.contains("ragged")));
     let found = outcome.features(outcome.mesh(), &Default::default(), &mut Silent).unwrap();
     let facets: Vec<[u32; 2]> =
         found.features.iter().flat_map(|feature| feature.facets.clone()).collect();

@@ -2,6 +2,8 @@
 
 use std::collections::HashSet;
 
+use rayon::prelude::*;
+
 use crate::conform::feature_facets;
 use crate::crests::Pieces;
 use crate::improve::{Align, Held, ImproveOptions, ImproveReport, Improver};
@@ -65,7 +67,7 @@ pub(super) fn improve<const D: usize>(
     let Connected { run, mesh, freedom, report, mirror_report } = connected;
     let options = &run.options().improve;
     let Some(pieces) = run.pieces() else {
-        let held = Held { freedom: &freedom, facets: &[] };
+        let held = Held { freedom: &freedom, facets: &[], near: None };
         let (mesh, improved) = improver.improve(mesh, held, run.fields(), options, watch)?;
         return Ok(Improved { run, mesh, report, mirror_report, improve_report: Some(improved) });
     };
@@ -79,6 +81,9 @@ const TRIED_ANGLE: [f64; 2] = [25.0, 15.0];
 
 /// How far from bad cells what is held is given free, time after time, in rings of cells around them.
 const RELEASES: [usize; 3] = [0, 1, 3];
+
+/// How many rings of cells more are improved then.
+const AROUND: usize = 2;
 
 /// Improves a mesh around its facets on features. Where cells stay below the floor of angles, the floor wins: facets
 /// and points of features at such cells are given free, and the mesh is improved once more.
@@ -105,7 +110,7 @@ fn improve_around<const D: usize>(
     let min_angle = options.min_angle.max(TRIED_ANGLE[D - 2]);
     let tried = ImproveOptions { min_angle, ..*options };
     let held = facets(&mesh);
-    let held = Held { freedom: &freedom, facets: &held };
+    let held = Held { freedom: &freedom, facets: &held, near: None };
     let (mut mesh, mut report) = improver.improve(mesh, held, fields, &tried, watch)?;
     for rings in RELEASES {
         let is_released = near_bad_cells(&mesh, options.min_angle, rings);
@@ -113,6 +118,7 @@ fn improve_around<const D: usize>(
             (report.below, report.floor_held) = (0, true);
             break;
         }
+        let near = near_bad_cells(&mesh, options.min_angle, rings + AROUND);
         let mut held = facets(&mesh);
         held.retain(|facet| !facet.iter().any(|&corner| is_released[corner as usize]));
         let mut is_held = vec![false; mesh.points().len()];
@@ -123,7 +129,7 @@ fn improve_around<const D: usize>(
                 false => bounds.freedom(p),
             })
             .collect();
-        let held = Held { freedom: &freedom, facets: &held };
+        let held = Held { freedom: &freedom, facets: &held, near: Some(&near) };
         let (better, next) = improver.improve(mesh, held, fields, options, watch)?;
         (mesh, report) = (better, report.and(next));
     }
@@ -132,18 +138,16 @@ fn improve_around<const D: usize>(
 
 /// The corners of cells with an angle below the floor, and, `rings` times, those of the cells around them.
 fn near_bad_cells<const D: usize>(mesh: &Mesh<D>, floor: f64, rings: usize) -> Vec<bool> {
+    let cells = mesh.corners().par_chunks_exact(D + 1).with_min_len(1 << 10);
+    let is_bad = |cell: &&[u32]| cell_shape(&mesh.simplex(cell).edges()).least_angle < floor;
+    let mut found: Vec<&[u32]> = cells.clone().filter(is_bad).collect();
     let mut is_near = vec![false; mesh.points().len()];
-    let mut mark = |cell: &[u32]| cell.iter().for_each(|&corner| is_near[corner as usize] = true);
-    for (cell, simplex) in mesh.cells().zip(mesh.simplices()) {
-        if cell_shape(&simplex.edges()).least_angle < floor {
-            mark(cell);
+    for ring in 0..=rings {
+        if ring > 0 {
+            let has_near = |cell: &&[u32]| cell.iter().any(|&corner| is_near[corner as usize]);
+            found = cells.clone().filter(has_near).collect();
         }
-    }
-    for _ in 0..rings {
-        let before = is_near.clone();
-        for cell in mesh.cells().filter(|cell| cell.iter().any(|&c| before[c as usize])) {
-            cell.iter().for_each(|&corner| is_near[corner as usize] = true);
-        }
+        found.iter().copied().flatten().for_each(|&corner| is_near[corner as usize] = true);
     }
     is_near
 }

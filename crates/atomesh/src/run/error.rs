@@ -174,6 +174,12 @@ pub enum Warning {
         /// What stands in the way.
         why: &'static str,
     },
+    /// Facets are turned onto features, but no atoms put on them, where nobody asked for either.
+    #[error("no atoms are put on features, facets are turned onto them instead: {why}")]
+    TurnedOnly {
+        /// What stands in the way.
+        why: String,
+    },
     /// Some of the features are not met by facets of their own.
     #[error("{:.0} % of the features are not met, where they cross, end, or are nearer to each other than about two thirds of an edge, first near {place}: shorter edges meet more", 100.0 * share)]
     NotMet {
@@ -204,6 +210,13 @@ pub enum Warning {
         /// The box along the axis.
         extent: f64,
     },
+}
+
+impl Warning {
+    /// Whether this is a choice made for the user, not something amiss.
+    pub fn is_note(&self) -> bool {
+        matches!(self, Self::TurnedOnly { .. })
+    }
 }
 
 /// The most things that a warning names.

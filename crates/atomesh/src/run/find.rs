@@ -3,7 +3,8 @@
 use rayon::prelude::*;
 
 use crate::crests::{
-    FeaturePoint, Hysteresis, Pieces, in_large_groups, linked, strongest, strongest_tenth,
+    Cleanness, FeaturePoint, Hysteresis, Pieces, in_large_groups, linked, strongest,
+    strongest_tenth,
 };
 use crate::enhance::{self, FeatureOptions, Features};
 use crate::fields::{NominalDistance, ScalarField};
@@ -11,7 +12,7 @@ use crate::image::{Grid, rows};
 use crate::improve::Align;
 use crate::watch::Watch;
 
-use super::error::RunError;
+use super::error::{RunError, Warning};
 use super::inputs::Inputs;
 use super::options::MeshOptions;
 use super::prepare::image_of;
@@ -31,10 +32,14 @@ const GROUP_DEPTH_SHARE: f64 = 0.45;
 const LEAST_PIECE: [f64; 2] = [1.5, 6.0];
 
 /// The least share of points on clean features with which atoms are put on features unasked, in the plane and in space.
-/// Discs, balls and faults that are planes have 0.75 and more, planes whose samples are three times as far apart along one
-/// axis 0.6 to 0.74; a photograph of faults has 0.44, a torso 0.64 and a brain 0.56: of the features of these fewer are met by
+/// Discs, balls and faults that are planes have 0.75 and more; a photograph of faults has 0.44, a torso 0.64 and a brain 0.56: of the features of these fewer are met by
 /// rows of atoms of their own than by facets that turn onto them.
 const LEAST_CLEAN: [f64; 2] = [0.7, 0.6];
+
+/// The share of points beside no clean feature up to which features are clean all the same: short lines are mostly tips,
+/// and valleys fan out about these; sheets whose samples are far apart along one axis are rough. Single lines, the
+/// planes and faults of synthetic images have 0.002 and less; a brain 0.019, a torso 0.04, a photograph of faults 0.09.
+const MOST_UNEXPLAINED: f64 = 0.006;
 
 /// The share below which features that were looked for in a block of a volume alone are taken to be ragged everywhere.
 const RAGGED: f64 = 0.52;
@@ -59,6 +64,20 @@ pub(super) struct Found<const D: usize> {
     pub pieces: Option<Pieces<D>>,
     /// Whether features are too ragged for rows of atoms; facets are turned onto them all the same.
     pub are_ragged: bool,
+    /// What is to be said of that.
+    pub note: Option<Warning>,
+}
+
+impl<const D: usize> Found<D> {
+    /// Features of which this share is clean.
+    fn ragged(clean: f64) -> Self {
+        let why = format!(
+            "features are ragged, {:.0} % of them clean {}; --align conform puts atoms on them all the same",
+            100.0 * clean,
+            if D == 2 { "lines" } else { "sheets" }
+        );
+        Self { pieces: None, are_ragged: true, note: Some(Warning::TurnedOnly { why }) }
+    }
 }
 
 /// The features, in lattice coordinates.
@@ -71,38 +90,48 @@ pub(super) fn find_features<const D: usize>(
     let Known { potential, distance, crests } = known;
     let grid = potential.grid();
     let is_asked = options.improve.align == Align::Auto;
-    let ragged = Found { pieces: None, are_ragged: true };
     let points = match crests {
         Some(crests) => crests,
         None => {
-            if is_asked && is_block_ragged(inputs, options, potential, distance, watch)? {
-                return Ok(ragged);
+            let block = if is_asked {
+                of_block(inputs, options, potential, distance, watch)?
+            } else {
+                None
+            };
+            if let Some(found) = block.filter(|found| are_ragged(*found, RAGGED)) {
+                return Ok(Found::ragged(found.clean));
             }
             feature_points(inputs, options, potential, distance, watch)?
         }
     };
-    if is_asked && Pieces::clean_share(&points, grid) < LEAST_CLEAN[D - 2] {
-        return Ok(ragged);
+    if is_asked && points.is_empty() {
+        return Ok(Found { are_ragged: true, ..Found::default() });
+    }
+    if is_asked {
+        let found = Pieces::cleanness(&points, grid);
+        if are_ragged(found, LEAST_CLEAN[D - 2]) {
+            return Ok(Found::ragged(found.clean));
+        }
     }
     let pieces = Pieces::new(points, grid, least_piece(grid, distance));
-    Ok(Found { pieces: (!pieces.is_empty()).then_some(pieces), are_ragged: false })
+    Ok(Found { pieces: (!pieces.is_empty()).then_some(pieces), ..Found::default() })
 }
 
-/// Whether the features of a block of a volume are so ragged that those of the rest need not be looked for. Small volumes
-/// are looked at whole, and so are those of kinds that are not found from near samples alone.
-fn is_block_ragged<const D: usize>(
+/// How clean the features of a block of a volume are: if they are ragged, those of the rest need not be looked for. Small
+/// volumes are looked at whole, and so are those of kinds that are not found from near samples alone.
+fn of_block<const D: usize>(
     inputs: &Inputs<'_, D>,
     options: &MeshOptions<D>,
     potential: &ScalarField<D>,
     distance: &NominalDistance<D>,
     watch: &mut dyn Watch,
-) -> Result<bool, RunError> {
+) -> Result<Option<Cleanness>, RunError> {
     let grid = potential.grid();
     let kind = options.features.features;
     let is_local = matches!(kind, Features::Dark | Features::Bright | Features::Edges);
     let is_local = inputs.is_potential || is_local && options.mixture.is_none();
     if D < 3 || grid.sample_count() < 8 * BLOCK.iter().product::<usize>() || !is_local {
-        return Ok(false);
+        return Ok(None);
     }
     let (start, end) = deepest_block(potential);
     let image = inputs.image.crop(start, end).expect("the block lies within the image");
@@ -112,7 +141,12 @@ fn is_block_ragged<const D: usize>(
     let potential = ScalarField::potential(block, samples, options.interpolation)?;
     let inputs = Inputs { image: &image, ..*inputs };
     let points = feature_points(&inputs, options, &potential, distance, watch)?;
-    Ok(Pieces::clean_share(&points, &block) < RAGGED)
+    Ok(Some(Pieces::cleanness(&points, &block)))
+}
+
+/// Whether too few points lie on clean features, and too many beside none.
+fn are_ragged(found: Cleanness, least_clean: f64) -> bool {
+    found.clean < least_clean && found.unexplained > MOST_UNEXPLAINED
 }
 
 /// The first sample of a block where b is farthest from 0, and the one after its last: its planes are chosen first, then

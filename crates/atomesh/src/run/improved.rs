@@ -136,7 +136,9 @@ fn followed_features<const D: usize>(
     }
     let step = grid.step.iter().sum::<f64>() / D as f64;
     let size = run.distance().mean();
+    check(watch, Phase::Measure, 0.0, None)?;
     let smooth = smoothed(run.potential(), run.distance())?;
+    check(watch, Phase::Measure, 0.5, None)?;
     let reach = (0.1 * size).max(step);
     let field = FacetField::in_valleys(mesh, &smooth, reach, FOLLOWED_DEPTH, watch)?;
     let options = FeatureFacetOptions {

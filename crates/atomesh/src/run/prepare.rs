@@ -55,10 +55,14 @@ pub(super) fn prepare<const D: usize>(
         }
         match why_not(&options, &grid, &distance, is_masked) {
             Some(why) if asked == Align::Conform => warnings.push(Warning::NotConforming { why }),
+            Some(why) if potential.range() != (0.0, 0.0) && options.kind == MeshKind::Delaunay => {
+                warnings.push(Warning::TurnedOnly { why: why.into() });
+            }
             Some(_) => {}
             None => {
                 let known = Known { potential: &potential, distance: &distance, crests };
                 found = find_features(&inputs, &options, known, watch)?;
+                warnings.extend(found.note.take());
             }
         }
         options.improve.align = if found.pieces.is_some() { Align::Conform } else { Align::Full };

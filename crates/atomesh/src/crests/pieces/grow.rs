@@ -4,10 +4,10 @@ use std::collections::VecDeque;
 
 use rayon::prelude::*;
 
-use super::super::{Bins, FeaturePoint, PointGrid};
-use super::link::{Alike, later_neighbours};
+use super::super::FeaturePoint;
+use super::link::{Alike, Around, linked_pairs};
 use super::meet::fill_in;
-use crate::geometry::{Bounds, Sets, difference, dot};
+use crate::geometry::{Bounds, PointGrid, Sets, difference, dot};
 
 /// Points this near to a piece's are explained by it, in mean steps; and those in the flank of its valley, where noise
 /// makes valleys of its own: as near as this, and weaker by this.
@@ -37,20 +37,13 @@ pub(super) fn add_rest<const D: usize>(
     let (rest, explained) = unexplained(points, rest, bounds, step);
     fill_in(points, sets, &explained, bounds, step);
     let alike = Alike { reach, cosine: 0.8, slope: 0.4, slack: 0.35 };
-    let mut around = vec![Vec::new(); rest.len()];
-    for (i, later) in later_neighbours(&rest, bounds, &alike, step).into_iter().enumerate() {
-        for j in later {
-            around[i].push(j);
-            around[j as usize].push(i as u32);
-        }
-    }
+    let around = Around::new(rest.len(), &linked_pairs(&rest, bounds, &alike, step));
     let mut seeds: Vec<u32> = (0..rest.len() as u32).collect();
     seeds.sort_by(|&a, &b| {
         let of = |i: u32| rest[i as usize].strength;
         of(b).total_cmp(&of(a)).then(a.cmp(&b))
     });
-    let positions = rest.iter().map(|point| point.position);
-    let all = Bins::of(bounds, step, positions);
+    let all = PointGrid::new(bounds, LAYER * step, rest.iter().map(|point| point.position));
     let mut piece = vec![u32::MAX; rest.len()];
     let mut next = VecDeque::new();
     for (number, seed) in (0..).zip(seeds) {
@@ -60,7 +53,7 @@ pub(super) fn add_rest<const D: usize>(
         piece[seed as usize] = number;
         next.push_back(seed);
         while let Some(i) = next.pop_front() {
-            for &j in &around[i as usize] {
+            for &j in around.of(i) {
                 if piece[j as usize] == u32::MAX
                     && !is_beside(&rest, j as usize, number, &piece, &all, step)
                 {
@@ -90,19 +83,12 @@ fn unexplained<const D: usize>(
     bounds: &Bounds<D>,
     step: f64,
 ) -> (Vec<FeaturePoint<D>>, Vec<FeaturePoint<D>>) {
-    let grid = PointGrid::new(bounds, 2.0 * step, points.iter().map(|point| point.position));
-    let (near, flank) = (EXPLAINED * step, FLANK * step);
-    let along = EXPLAINED_ALONG * step;
-    let slope = if D == 2 { FAN } else { 0.0 };
+    let grid =
+        PointGrid::new(bounds, EXPLAINED_ALONG * step, points.iter().map(|point| point.position));
     let is_free = |point: &FeaturePoint<D>| {
         let mut is_free = true;
-        grid.near(&point.position, flank.max(along), |place, i| {
-            let offset = difference(place, &point.position);
-            let squared = dot(&offset, &offset);
-            let is_weaker = point.strength < WEAKER * points[i].strength;
-            let above = dot(&offset, &points[i].normal).abs();
-            let is_on = squared < along * along && above < near + slope * squared.sqrt();
-            is_free &= squared >= near * near && !is_on && (squared >= flank * flank || !is_weaker);
+        grid.near(&point.position, EXPLAINED_ALONG * step, |_, i| {
+            is_free = is_free && !explains(&points[i], point, step);
         });
         is_free
     };
@@ -114,6 +100,22 @@ fn unexplained<const D: usize>(
     (free, explained)
 }
 
+/// Whether a point of a piece explains another point.
+pub(super) fn explains<const D: usize>(
+    own: &FeaturePoint<D>,
+    other: &FeaturePoint<D>,
+    step: f64,
+) -> bool {
+    let (near, flank, along) = (EXPLAINED * step, FLANK * step, EXPLAINED_ALONG * step);
+    let slope = if D == 2 { FAN } else { 0.0 };
+    let offset = difference(&own.position, &other.position);
+    let squared = dot(&offset, &offset);
+    let above = dot(&offset, &own.normal).abs();
+    squared < near * near
+        || squared < along * along && above < near + slope * squared.sqrt()
+        || squared < flank * flank && other.strength < WEAKER * own.strength
+}
+
 /// How many points of each set stand beside others of it, as in a second layer; by root.
 pub(super) fn layered<const D: usize>(
     points: &[FeaturePoint<D>],
@@ -121,7 +123,7 @@ pub(super) fn layered<const D: usize>(
     bounds: &Bounds<D>,
     step: f64,
 ) -> Vec<usize> {
-    let all = Bins::of(bounds, step, points.iter().map(|point| point.position));
+    let all = PointGrid::new(bounds, LAYER * step, points.iter().map(|point| point.position));
     let is_beside = |i: usize| is_beside(points, i, roots[i], roots, &all, step);
     let are_beside: Vec<bool> =
         (0..points.len()).into_par_iter().with_min_len(1 << 8).map(is_beside).collect();
@@ -136,16 +138,16 @@ fn is_beside<const D: usize>(
     j: usize,
     number: u32,
     piece: &[u32],
-    all: &Bins<D>,
+    all: &PointGrid<D>,
     step: f64,
 ) -> bool {
     let (point, reach) = (&rest[j], LAYER * step);
     let mut is_beside = false;
-    all.near(&point.position, reach, |k| {
+    all.near(&point.position, reach, |position, k| {
         if piece[k] != number {
             return;
         }
-        let offset = difference(&rest[k].position, &point.position);
+        let offset = difference(position, &point.position);
         let length = dot(&offset, &offset).sqrt();
         let above = dot(&offset, &point.normal).abs();
         is_beside |=

@@ -4,10 +4,11 @@ use std::collections::VecDeque;
 
 use rayon::prelude::*;
 
-use super::super::{FeaturePoint, PointGrid};
-use super::grow::{add_rest, layered};
+use super::super::FeaturePoint;
+use super::Cleanness;
+use super::grow::{EXPLAINED_ALONG, add_rest, explains, layered};
 use super::meet::join_across;
-use crate::geometry::{Bounds, Point, Sets, difference, dot};
+use crate::geometry::{Bounds, Point, PointGrid, Sets, difference, dot};
 use crate::image::Grid;
 
 /// How far linked points may be apart, over the diagonal of a sample's cell.
@@ -27,6 +28,8 @@ const NEXT_IN_SPACE: Next = Next { reach: 2.5, most: 0.12 };
 const AT_SIDE: f64 = 1.0;
 /// How many points are asked for the share of those on clean features.
 const ASKED: usize = 20_000;
+/// How many of them are asked whether others explain them, which takes longer.
+const ASKED_FURTHER: usize = 2_000;
 /// Sets of fewer points, in space of fewer than the square, are linked anew with what is left.
 const SMALL: usize = 12;
 /// Sets of which so many points stand beside others, in the plane and in space, fork, and are linked again as small ones are.
@@ -34,6 +37,8 @@ const LAYERED: [usize; 2] = [5, 150];
 /// What goes on across a place where features meet, and what over a gap. Reaches are set where they are used.
 const ACROSS: Alike = Alike { reach: 0.0, cosine: 0.96, slope: 0.08, slack: 0.4 };
 const OVER_GAPS: Alike = Alike { reach: 0.0, cosine: 0.95, slope: 0.12, slack: 0.4 };
+/// Points whose links one task finds.
+const TASK: usize = 1 << 12;
 /// The fewest points on a point's plane, itself among them, in the plane; twice as many in space.
 const LEAST_ON: usize = 4;
 
@@ -58,17 +63,17 @@ pub(super) fn linked_pieces<const D: usize>(
     let (mut points, mut others) = supported(points, &bounds, step);
     points.sort_by_key(|point| point.index);
     let mut sets = Sets::new(points.len());
-    join(&mut sets, &later_neighbours(&points, &bounds, &alike, step));
+    let links = linked_pairs(&points, &bounds, &alike, step);
+    links.iter().for_each(|&[i, j]| sets.join(i, j));
     let meetings: Vec<Point<D>> = others.iter().map(|point| point.position).collect();
     join_across(&mut points, &mut sets, &meetings, &ACROSS, &bounds, step);
     others.extend(take_unclear(&mut points, &mut sets, &bounds, step));
     others.sort_by_key(|point| point.index);
     add_rest(&mut points, &mut sets, &others, &bounds, reach, step);
     join_across(&mut points, &mut sets, &[], &OVER_GAPS, &bounds, step);
-    let mut links = later_neighbours(&points, &bounds, &alike, step);
-    for (i, links) in links.iter_mut().enumerate() {
-        links.retain(|&j| sets.root(i as u32) == sets.root(j));
-    }
+    let roots = sets.roots();
+    let mut links = linked_pairs(&points, &bounds, &alike, step);
+    links.retain(|pair| roots[pair[0] as usize] == roots[pair[1] as usize]);
     turn(&mut points, &links);
     (points, sets)
 }
@@ -123,31 +128,57 @@ fn take_unclear<const D: usize>(
     small
 }
 
-/// Makes points that are linked one set.
-fn join(sets: &mut Sets, links: &[Vec<u32>]) {
-    for (i, all) in links.iter().enumerate() {
-        all.iter().for_each(|&j| sets.join(i as u32, j));
-    }
-}
-
-/// For each point the later ones that are on one line or plane with it.
-pub(super) fn later_neighbours<const D: usize>(
+/// The pairs of points that are on one line or plane, each with its earlier point first, in the order of these.
+pub(super) fn linked_pairs<const D: usize>(
     points: &[FeaturePoint<D>],
     bounds: &Bounds<D>,
     alike: &Alike,
     step: f64,
-) -> Vec<Vec<u32>> {
-    let grid = PointGrid::new(bounds, 1.5 * step, points.iter().map(|point| point.position));
-    let of = |i: usize| {
+) -> Vec<[u32; 2]> {
+    let grid = PointGrid::new(bounds, alike.reach, points.iter().map(|point| point.position));
+    let of = |start: usize| {
         let mut found = Vec::new();
-        grid.near(&points[i].position, alike.reach, |_, j| {
-            if j > i && alike.holds(&points[i], &points[j], step) {
-                found.push(j as u32);
-            }
-        });
+        for i in start..points.len().min(start + TASK) {
+            grid.near(&points[i].position, alike.reach, |_, j| {
+                if j > i && alike.holds(&points[i], &points[j], step) {
+                    found.push([i as u32, j as u32]);
+                }
+            });
+        }
         found
     };
-    (0..points.len()).into_par_iter().with_min_len(1 << 8).map(of).collect()
+    let tasks = (0..points.len().div_ceil(TASK)).into_par_iter().map(|task| of(task * TASK));
+    tasks.collect::<Vec<_>>().concat()
+}
+
+/// The points linked to each, and where those of each begin in the list.
+pub(super) struct Around {
+    starts: Vec<u32>,
+    linked: Vec<u32>,
+}
+
+impl Around {
+    /// Of pairs of so many points.
+    pub(super) fn new(count: usize, pairs: &[[u32; 2]]) -> Self {
+        let mut starts = vec![0; count + 1];
+        pairs.iter().flatten().for_each(|&i| starts[i as usize + 1] += 1);
+        (0..count).for_each(|i| starts[i + 1] += starts[i]);
+        let (mut next, mut linked) = (starts.clone(), vec![0; 2 * pairs.len()]);
+        for &[i, j] in pairs {
+            for (of, other) in [(i, j), (j, i)] {
+                let next = &mut next[of as usize];
+                linked[*next as usize] = other;
+                *next += 1;
+            }
+        }
+        Self { starts, linked }
+    }
+
+    /// The points linked to one.
+    pub(super) fn of(&self, i: u32) -> &[u32] {
+        let i = i as usize;
+        &self.linked[self.starts[i] as usize..self.starts[i + 1] as usize]
+    }
 }
 
 /// The points most of whose neighbours lie on their planes, and the others.
@@ -156,8 +187,10 @@ fn supported<const D: usize>(
     bounds: &Bounds<D>,
     step: f64,
 ) -> (Vec<FeaturePoint<D>>, Vec<FeaturePoint<D>>) {
-    let is_kept =
-        are_supported(&points, bounds, step, 1, if D == 2 { NEXT } else { NEXT_IN_SPACE });
+    let next = if D == 2 { NEXT } else { NEXT_IN_SPACE };
+    let support = Support::new(&points, bounds, step, next);
+    let all = (0..points.len()).into_par_iter().with_min_len(1 << 8);
+    let is_kept: Vec<bool> = all.map(|i| support.of(i)).collect();
     let (mut kept, mut others) = (Vec::new(), Vec::new());
     for (point, is_kept) in points.into_iter().zip(is_kept) {
         if is_kept {
@@ -169,51 +202,76 @@ fn supported<const D: usize>(
     (kept, others)
 }
 
-/// The share of points most of whose neighbours lie on their planes; of many points some are asked.
-pub(super) fn clean_share<const D: usize>(points: &[FeaturePoint<D>], grid: &Grid<D>) -> f64 {
+/// How clean features are; of many points some are asked.
+pub(super) fn cleanness<const D: usize>(points: &[FeaturePoint<D>], grid: &Grid<D>) -> Cleanness {
     let step = grid.step.iter().sum::<f64>() / D as f64;
-    let stride = (points.len() / ASKED).max(1);
-    let are_supported = are_supported(points, &grid.bounds(), step, stride, NEXT);
-    let count = are_supported.iter().filter(|&&is| is).count();
-    count as f64 / are_supported.len().max(1) as f64
+    let support = Support::new(points, &grid.bounds(), step, NEXT);
+    let share = |asked: usize, is: &(dyn Fn(usize) -> bool + Sync)| {
+        let stride = (points.len() / asked).max(1);
+        let all = (0..points.len().div_ceil(stride)).into_par_iter().with_min_len(1 << 6);
+        let count = all.clone().filter(|&i| is(i * stride)).count();
+        count as f64 / all.len().max(1) as f64
+    };
+    let clean = share(ASKED, &|i| support.of(i));
+    let unexplained = share(ASKED_FURTHER, &|i| !support.of(i) && !support.is_explained(i));
+    Cleanness { clean, unexplained }
 }
 
-/// For every so many points, whether most of its neighbours lie on its plane.
-fn are_supported<const D: usize>(
-    points: &[FeaturePoint<D>],
-    bounds: &Bounds<D>,
+/// Whether points lie on one feature alone.
+struct Support<'a, const D: usize> {
+    points: &'a [FeaturePoint<D>],
+    near: PointGrid<D>,
     step: f64,
-    stride: usize,
-    next_to: Next,
-) -> Vec<bool> {
-    let bins = PointGrid::new(bounds, 1.5 * step, points.iter().map(|point| point.position));
-    let reach = SUPPORT * step;
-    let is_supported = |i: usize| {
-        let point = &points[i * stride];
+    next: Next,
+}
+
+impl<'a, const D: usize> Support<'a, D> {
+    fn new(points: &'a [FeaturePoint<D>], bounds: &Bounds<D>, step: f64, next: Next) -> Self {
+        let positions = points.iter().map(|point| point.position);
+        Self { points, near: PointGrid::new(bounds, SUPPORT * step, positions), step, next }
+    }
+
+    /// Whether most neighbours of a point lie on its plane.
+    fn of(&self, i: usize) -> bool {
+        let (point, reach) = (&self.points[i], SUPPORT * self.step);
         let (mut on, mut all, mut others, mut next) = (0usize, 0usize, 0usize, 0usize);
-        bins.near(&point.position, reach, |_, j| {
-            let offset = difference(&points[j].position, &point.position);
+        self.near.near(&point.position, reach, |position, j| {
+            let offset = difference(position, &point.position);
             let squared = dot(&offset, &offset);
             if squared > reach * reach {
                 return;
             }
-            let is_next = squared <= (next_to.reach * step).powi(2);
+            let is_next = squared <= (self.next.reach * self.step).powi(2);
             next += usize::from(is_next);
-            if dot(&points[j].normal, &point.normal).abs() < ALIKE {
+            if dot(&self.points[j].normal, &point.normal).abs() < ALIKE {
                 // of another feature, or around a bend
                 others += usize::from(is_next);
                 return;
             }
             all += 1;
             let height = dot(&offset, &point.normal).abs();
-            on += usize::from(height <= 0.12 * squared.sqrt() + 0.3 * step);
+            on += usize::from(height <= 0.12 * squared.sqrt() + 0.3 * self.step);
         });
         on >= LEAST_ON * (D - 1)
-            && others as f64 <= next_to.most * next as f64
+            && others as f64 <= self.next.most * next as f64
             && on as f64 >= LEAST_SUPPORT * all as f64
-    };
-    let count = points.len().div_ceil(stride);
-    (0..count).into_par_iter().with_min_len(1 << 8).map(is_supported).collect()
+    }
+
+    /// Whether points that have support explain this one; in the plane, points of one line: where many cross there is no
+    /// room for rows of atoms on each, while sheets cross along lines, which are fewer.
+    fn is_explained(&self, i: usize) -> bool {
+        let (mut by, mut is_one) = (None, true);
+        let point = &self.points[i];
+        self.near.near(&point.position, EXPLAINED_ALONG * self.step, |_, j| {
+            let own = &self.points[j];
+            if i == j || D > 2 && by.is_some() || !explains(own, point, self.step) || !self.of(j) {
+                return;
+            }
+            let first = by.get_or_insert(own.normal);
+            is_one &= dot(first, &own.normal).abs() >= ALIKE;
+        });
+        by.is_some() && is_one
+    }
 }
 
 /// How far two points may be apart and differ and still be of one piece.
@@ -247,14 +305,8 @@ impl Alike {
 }
 
 /// Turns the normals of linked points to the same side, from the first point of each piece on.
-fn turn<const D: usize>(points: &mut [FeaturePoint<D>], links: &[Vec<u32>]) {
-    let mut around = vec![Vec::new(); points.len()];
-    for (i, links) in links.iter().enumerate() {
-        for &j in links {
-            around[i].push(j);
-            around[j as usize].push(i as u32);
-        }
-    }
+fn turn<const D: usize>(points: &mut [FeaturePoint<D>], links: &[[u32; 2]]) {
+    let around = Around::new(points.len(), links);
     let mut is_turned = vec![false; points.len()];
     let mut next = VecDeque::new();
     for first in 0..points.len() {
@@ -262,17 +314,17 @@ fn turn<const D: usize>(points: &mut [FeaturePoint<D>], links: &[Vec<u32>]) {
             continue;
         }
         is_turned[first] = true;
-        next.push_back(first);
+        next.push_back(first as u32);
         while let Some(i) = next.pop_front() {
-            let normal = points[i].normal;
-            for &j in &around[i] {
-                let j = j as usize;
+            let normal = points[i as usize].normal;
+            for &linked in around.of(i) {
+                let j = linked as usize;
                 if !is_turned[j] {
                     is_turned[j] = true;
                     if dot(&normal, &points[j].normal) < 0.0 {
                         points[j].normal = points[j].normal.map(|n| -n);
                     }
-                    next.push_back(j);
+                    next.push_back(linked);
                 }
             }
         }

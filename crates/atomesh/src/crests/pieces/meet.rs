@@ -4,10 +4,10 @@ use std::collections::HashSet;
 
 use rayon::prelude::*;
 
-use super::super::{Bins, FeaturePoint, PointGrid};
+use super::super::FeaturePoint;
 use super::grow::{EXPLAINED, EXPLAINED_ALONG};
 use super::link::{Alike, SUPPORT};
-use crate::geometry::{Bounds, Point, Sets, difference, distance_squared, dot};
+use crate::geometry::{Bins, Bounds, Point, PointGrid, Sets, difference, distance_squared, dot};
 
 /// How far pieces on one line or plane may be apart and still be joined, in mean steps.
 const BRIDGE: f64 = 26.0;
@@ -94,8 +94,8 @@ fn ends<const D: usize>(
     bounds: &Bounds<D>,
     step: f64,
 ) -> Vec<End<D>> {
-    let meeting_grid = PointGrid::new(bounds, 3.0 * step, meetings.iter().copied());
-    let grid = PointGrid::new(bounds, 1.5 * step, points.iter().map(|point| point.position));
+    let meeting_grid = PointGrid::new(bounds, NEAR_MEETING * step, meetings.iter().copied());
+    let grid = PointGrid::new(bounds, SUPPORT * step, points.iter().map(|point| point.position));
     let is_at_meeting = |point: &FeaturePoint<D>| {
         let (reach, mut found) = (NEAR_MEETING * step, false);
         meeting_grid.near(&point.position, reach, |place, _| {
@@ -193,7 +193,7 @@ fn fill_once<const D: usize>(
     step: f64,
 ) {
     let roots = sets.roots();
-    let grid = PointGrid::new(bounds, 1.5 * step, points.iter().map(|point| point.position));
+    let grid = PointGrid::new(bounds, SUPPORT * step, points.iter().map(|point| point.position));
     let reach = EXPLAINED_ALONG * step;
     let places = |point: &FeaturePoint<D>| {
         let mut beside: Vec<Beside<D>> = Vec::new();

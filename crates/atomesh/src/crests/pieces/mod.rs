@@ -18,10 +18,10 @@ use std::collections::HashSet;
 
 use rayon::prelude::*;
 
-use super::{FeaturePoint, PointGrid};
-use crate::geometry::{Bounds, Point, Sets, difference, distance_squared, dot};
+use super::FeaturePoint;
+use crate::geometry::{Bounds, Point, PointGrid, Sets, difference, distance_squared, dot};
 use crate::image::Grid;
-use link::{clean_share, linked_pieces};
+use link::{cleanness, linked_pieces};
 use patch::{Cloud, Patch};
 
 /// The width of cubes in which one patch stands for all of a piece, in mean steps, and how far from a patch's middle
@@ -61,6 +61,15 @@ pub struct Pieces<const D: usize> {
     bounds: Bounds<D>,
     /// The mean step of the image.
     step: f64,
+}
+
+/// Whether features can be followed as lines or sheets.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Cleanness {
+    /// The share of points that lie on a line or sheet of their own: most points near them lie on their own plane.
+    pub clean: f64,
+    /// The share of points that neither do, nor lie beside points that do, as where lines or sheets end or cross.
+    pub unexplained: f64,
 }
 
 /// The nearest place on a piece.
@@ -121,10 +130,11 @@ impl<const D: usize> Pieces<D> {
         let mut pieces = of_all.iter();
         points.retain(|_| pieces.next() != Some(&u32::MAX));
         let of_points: Vec<u32> = of_all.into_iter().filter(|&piece| piece != u32::MAX).collect();
-        let grid = PointGrid::new(bounds, 1.5 * step, points.iter().map(|point| point.position));
+        let grid =
+            PointGrid::new(bounds, patch::REACH * step, points.iter().map(|point| point.position));
         let cloud = Cloud { points: &points, pieces: &of_points, grid: &grid, step };
         let (patches, of_patches) = patches(&cloud);
-        let patch_grid = PointGrid::new(bounds, PATCH * step, patches.iter().map(|p| p.at));
+        let patch_grid = PointGrid::new(bounds, 2.0 * PATCH * step, patches.iter().map(|p| p.at));
         let first = firsts(&points, &of_points, COARSE * step);
         let coarse =
             PointGrid::new(bounds, COARSE * step, first.iter().map(|&i| points[i].position));
@@ -144,10 +154,9 @@ impl<const D: usize> Pieces<D> {
         }
     }
 
-    /// The share of points, in lattice coordinates, that lie on features clean enough to be followed as lines or
-    /// sheets: most points near them lie on their own plane. Of many points some are asked.
-    pub fn clean_share(points: &[FeaturePoint<D>], grid: &Grid<D>) -> f64 {
-        clean_share(points, grid)
+    /// How clean the features are that points, in lattice coordinates, lie on. Of many points some are asked.
+    pub fn cleanness(points: &[FeaturePoint<D>], grid: &Grid<D>) -> Cleanness {
+        cleanness(points, grid)
     }
 
     /// How many pieces there are.
@@ -183,6 +192,16 @@ impl<const D: usize> Pieces<D> {
     /// Places on all pieces some two steps apart, with the piece of each.
     pub(crate) fn places(&self) -> impl ExactSizeIterator<Item = (Point<D>, u32)> {
         self.patches.iter().zip(&self.of_patches).map(|(patch, (piece, _))| (patch.at, *piece))
+    }
+
+    /// Places on all pieces, one in each cube of [`Self::sparse`].
+    pub(crate) fn sparse_places(&self) -> impl Iterator<Item = Point<D>> {
+        self.coarse.positions()
+    }
+
+    /// The width of these cubes.
+    pub(crate) fn sparse(&self) -> f64 {
+        COARSE * self.step
     }
 
     /// The width of the cubes in each of which a piece has one of [`Self::places`], if it has points there.

@@ -1,13 +1,13 @@
 //! A piece near one of its points, as a surface of second degree over the tangent plane there.
 
-use super::super::{FeaturePoint, PointGrid};
+use super::super::FeaturePoint;
 use super::tangents;
 use crate::geometry::linear::solve;
-use crate::geometry::{Point, difference, dot};
+use crate::geometry::{Point, PointGrid, difference, dot};
 
 /// The deviation of the weights of a fit, and the radius of its points, in mean steps.
 const WIDTH: f64 = 1.3;
-const REACH: f64 = 3.25;
+pub(super) const REACH: f64 = 3.25;
 /// How far from its middle a patch is bent, in mean steps: beyond, it goes on as its tangent plane.
 const BENT: f64 = 3.0;
 /// How often a foot is improved.

@@ -279,12 +279,31 @@ impl<const D: usize> Row<'_, D> {
 
     /// Second derivatives of the smoothed image, per squared lattice unit.
     pub(super) fn hessian(&self, x: usize) -> [[f64; D]; D] {
-        let unit = |c: usize| std::array::from_fn(|k| if k == c { 1.0 } else { 0.0 });
-        let change = |c: usize, k: usize| {
-            let [less, more] = [-1, 1].map(|by| self.slope(&unit(c), x, step::<D>(k, by)));
-            f64::from(more - less) / (2.0 * self.grid.step[k])
-        };
-        std::array::from_fn(|a| std::array::from_fn(|b| 0.5 * (change(a, b) + change(b, a))))
+        let (own, mut factor) = (if D > 2 { 4 } else { 1 }, 1);
+        let mut changes = [[0.0; D]; D];
+        for k in 0..D {
+            let twice = 2.0 * self.grid.step[k];
+            if k == 0 {
+                let [less, more] = [x.saturating_sub(1), (x + 1).min(self.average.len() - 1)];
+                // mirrored: the sample itself, with the slope along the row turned
+                let [first, last] = [(less, less == x), (more, more == x)];
+                for c in 0..D {
+                    let at = |(i, is_mirrored): (usize, bool)| {
+                        let slope = self.beside[own].slopes[c][i];
+                        if is_mirrored && c == 0 { -slope } else { slope }
+                    };
+                    changes[c][k] = f64::from(at(last) - at(first)) / twice;
+                }
+                continue;
+            }
+            let [less, more] = [own - factor, own + factor].map(|code| &self.beside[code]);
+            for c in 0..D {
+                let at = |row: &Beside<'_, D>| row.signs[c] * row.slopes[c][x];
+                changes[c][k] = f64::from(at(more) - at(less)) / twice;
+            }
+            factor *= 3;
+        }
+        std::array::from_fn(|a| std::array::from_fn(|b| 0.5 * (changes[a][b] + changes[b][a])))
     }
 
     /// The crest at `offset` lattice units along the normal from sample `x`, if it is near enough.

@@ -12,7 +12,7 @@ use super::unit::UnitValues;
 use super::{CrestOptions, Finder, Polarity, Thresholds};
 use crate::crests::FeaturePoint;
 use crate::enhance::EnhanceError;
-use crate::geometry::linear::largest_eigenpair;
+use crate::geometry::linear::largest_eigenvector;
 use crate::image::{Grid, StructureTensor};
 use crate::watch::{Cancelled, Watch};
 
@@ -121,7 +121,7 @@ pub(in crate::enhance) fn valleys<const D: usize>(
 
 /// The direction in which the image is bent downwards most.
 fn across<const D: usize>(hessian: [[f64; D]; D]) -> [f32; D] {
-    largest_eigenpair(hessian.map(|row| row.map(|h| -h))).1.map(|n| n as f32)
+    largest_eigenvector(hessian.map(|row| row.map(|h| -h))).map(|n| n as f32)
 }
 
 #[cfg(test)]

@@ -105,7 +105,7 @@ impl Scene {
         let options = ImproveOptions { align, ..ImproveOptions::for_dimension(2) };
         let (mesh, fields) = (mesh.clone(), self.fields());
         PlaneImprover
-            .improve(mesh, Held { freedom, facets: &[] }, fields, &options, &mut Silent)
+            .improve(mesh, Held { freedom, facets: &[], near: None }, fields, &options, &mut Silent)
             .unwrap()
     }
 
@@ -410,7 +410,7 @@ fn floors_that_no_triangle_keeps_are_refused() {
         let (mesh, fields) = (mesh.clone(), scene.fields());
         let result = PlaneImprover.improve(
             mesh,
-            Held { freedom: &freedom, facets: &[] },
+            Held { freedom: &freedom, facets: &[], near: None },
             fields,
             &options,
             &mut Silent,

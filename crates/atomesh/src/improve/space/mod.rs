@@ -88,7 +88,7 @@ impl Improver<3> for SpaceImprover {
         let mut report =
             ImproveReport { angle_before: whole.angles(1.0).least(), ..Default::default() };
         if options.align != Align::Off {
-            improve_parts(&mut whole, &work, &mut report, watch)?;
+            improve_parts(&mut whole, &work, held.near, &mut report, watch)?;
         }
         let angles = whole.angles(options.min_angle.to_radians().cos());
         report.angle_after = angles.least();
@@ -99,14 +99,15 @@ impl Improver<3> for SpaceImprover {
     }
 }
 
-/// All passes over all parts.
+/// All passes over all parts, or over what of them is near some points.
 fn improve_parts(
     whole: &mut WholeMesh<'_>,
     work: &Work<'_>,
+    near: Option<&[bool]>,
     report: &mut ImproveReport,
     watch: &mut dyn Watch,
 ) -> Result<(), ImproveError> {
-    let mut pending: Option<Vec<bool>> = None;
+    let mut pending = near.map(<[bool]>::to_vec);
     for (pass, &cut) in CUTS.iter().enumerate() {
         check(watch, Phase::Improve, pass as f64 / CUTS.len() as f64, None)?;
         let divided = whole.divide(cut, pending.as_deref());

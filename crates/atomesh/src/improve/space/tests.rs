@@ -51,7 +51,7 @@ fn improve(
     let freedom = vec![7; mesh.points().len()];
     SpaceImprover.improve(
         mesh,
-        Held { freedom: &freedom, facets: &[] },
+        Held { freedom: &freedom, facets: &[], near: None },
         fields,
         options,
         &mut Silent,
@@ -133,7 +133,7 @@ proptest! {
         let distance = NominalDistance::constant(potential.grid(), 3.0).unwrap();
         let fields = FieldsView { potential: &potential, weight: &weight, distance: &distance };
         let options = ImproveOptions { align, ..ImproveOptions::for_dimension(3) };
-        let given = Held { freedom: &freedom, facets: &held };
+        let given = Held { freedom: &freedom, facets: &held, near: None };
         let better = SpaceImprover.improve(mesh.clone(), given, fields, &options, &mut Silent);
         let (better, _) = better.unwrap();
         prop_assert_eq!(better.validate(), Ok(()));
@@ -282,7 +282,7 @@ fn a_floor_out_of_range_is_refused_and_a_watch_ends_the_work() {
     let options = ImproveOptions::for_dimension(3);
     let ended = SpaceImprover.improve(
         mesh,
-        Held { freedom: &freedom, facets: &[] },
+        Held { freedom: &freedom, facets: &[], near: None },
         fields,
         &options,
         &mut Never,

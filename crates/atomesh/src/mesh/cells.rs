@@ -12,18 +12,20 @@
 
 use std::collections::HashMap;
 
+use rayon::prelude::*;
+
 use crate::geometry::{Point, Simplex};
-use crate::mesh::{ConnectError, Delaunay, Mesh};
 use crate::watch::Silent;
 
-use super::changes::{CellChanges, sort_by_swaps};
+use super::cell_changes::{CellChanges, sort_by_swaps};
+use super::{ConnectError, Delaunay, Mesh};
 
 /// No cell: a facet of the hull.
 const NONE: u32 = u32::MAX;
 
 /// What happens to one atom: it comes, moves or goes.
 #[derive(Clone, Copy, Debug)]
-pub(super) struct AtomEdit<const D: usize> {
+pub(crate) struct AtomEdit<const D: usize> {
     pub atom: u32,
     /// Where it is afterwards; `None` if it goes.
     pub to: Option<Point<D>>,
@@ -31,7 +33,7 @@ pub(super) struct AtomEdit<const D: usize> {
 
 /// Cells with their neighbours, in places that are used again.
 #[derive(Clone, Debug)]
-pub(super) struct Cells<const D: usize> {
+pub(crate) struct Cells<const D: usize> {
     /// D + 1 corners a place, and the cell beyond the facet opposite each.
     corners: Vec<u32>,
     neighbours: Vec<u32>,
@@ -74,6 +76,12 @@ impl<const D: usize> Cells<D> {
     /// The corners of all cells, in no particular order.
     pub fn all(&self) -> impl Iterator<Item = &[u32]> {
         let cells = self.corners.chunks_exact(Self::CORNERS).zip(&self.is_cell);
+        cells.filter(|(_, is_cell)| **is_cell).map(|(corners, _)| corners)
+    }
+
+    /// [`Self::all`], on all threads.
+    pub fn par_all(&self) -> impl ParallelIterator<Item = &[u32]> {
+        let cells = self.corners.par_chunks_exact(Self::CORNERS).zip(&self.is_cell);
         cells.filter(|(_, is_cell)| **is_cell).map(|(corners, _)| corners)
     }
 
