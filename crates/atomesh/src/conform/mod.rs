@@ -90,7 +90,7 @@ impl From<OptimizeError> for ConformError {
 
 /// Puts atoms on features, and lets the others settle around them.
 ///
-/// Reports [`Phase::Grow`] and [`Phase::Optimize`] to `watch`.
+/// Reports [`crate::watch::Phase::Grow`] and [`crate::watch::Phase::Optimize`] to `watch`.
 ///
 /// # Errors
 /// [`ConformError`] if the atoms cannot be connected or moved, or `watch` ends the work.

@@ -5,7 +5,7 @@
 //! each atom). Each edit says what it changed ([`Changes`]). The mesh is always the one that connecting all atoms
 //! again would give.
 //!
-//! Cost: that of the change. The editor keeps the cells' neighbours ([`Cells`]), and which atoms are near a place.
+//! Cost: that of the change. The editor keeps the cells' neighbours (`Cells`), and which atoms are near a place.
 
 mod changes;
 mod error;
