@@ -2,16 +2,16 @@
 
 use std::path::{Path, PathBuf};
 
-use atomesh::image::Image;
+use atomesh::image::{Between, Frame, Image};
 use atomesh::run::Inputs;
-use atomesh_io::image::{AnyImage, ReadOptions};
+use atomesh_io::image::{AnyImage, ImageFormat, ReadOptions};
 
 use crate::dimension::Dimension;
 use crate::error::JobError;
 use crate::images;
 use crate::memory;
 use crate::options::RunConfig;
-use crate::session::Session;
+use crate::session::{Note, Session};
 
 /// The images that a mesh is made from, in place: in their frame, cropped, without NaN.
 #[derive(Clone, Debug)]
@@ -58,18 +58,22 @@ impl<const D: usize> MeshImages<D> {
     ) -> Result<Self, JobError> {
         let input = &run.input;
         let shown = input.shown();
+        let of = Samples::of(&image, run).map_err(|e| e.about_any(shown))?;
         let image = run.frame.place(image).map_err(|e| e.about_any(shown))?;
         run.mesh_options::<D>()?;
         memory::check_potential(image.samples().len(), "mesh").map_err(|e| e.about_any(shown))?;
-        let mut field = |path: &Option<PathBuf>| {
-            path.as_deref().map(|path| read_field(run, path, dimension, session)).transpose()
+        let mut field = |path: &Option<PathBuf>, between: Between| {
+            let read = |path| read_field(run, path, &of, between, dimension, session);
+            path.as_deref().map(read).transpose()
         };
-        let size_field = field(&input.size_field)?;
-        let weight_field = field(&input.beta_field)?;
-        let mask = field(&input.mask)?;
-        let labels = field(&input.labels)?;
-        // without IMAGE, the potential is the image
-        let potential = if input.image.is_some() { field(&input.potential)? } else { None };
+        let size_field = field(&input.size_field, Between::Linear { outside: None })?;
+        let weight_field = field(&input.beta_field, Between::Linear { outside: None })?;
+        let mask = field(&input.mask, Between::Nearest)?;
+        let labels = field(&input.labels, Between::Nearest)?;
+        // without IMAGE, the potential is the image; where it says nothing there is no feature
+        let no_feature = Between::Linear { outside: Some(0.0) };
+        let potential =
+            if input.image.is_some() { field(&input.potential, no_feature)? } else { None };
         let is_potential = input.potential.is_some() && potential.is_none();
         Ok(Self { image, is_potential, potential, size_field, weight_field, mask, labels })
     }
@@ -120,10 +124,39 @@ pub(crate) fn shown(run: &RunConfig) -> Result<&Path, JobError> {
     run.input.shown().ok_or_else(nothing)
 }
 
-/// Reads an image that must have the shape of the first, its box of interest taken.
+/// The samples of the image that gives the frame, before any of them are cropped.
+struct Samples<const D: usize> {
+    /// Where the file says that they are.
+    own: Frame<D>,
+    /// Where they are with what options say.
+    placed: Frame<D>,
+    /// Whether the file or an option says so at all.
+    is_placed: bool,
+}
+
+impl<const D: usize> Samples<D> {
+    fn of(image: &Image<D>, run: &RunConfig) -> Result<Self, JobError> {
+        let own = *image.frame();
+        let placed = run.frame.apply(own)?;
+        let is_placed =
+            placed != own || run.input.shown().is_some_and(|path| is_placed(path, &own));
+        Ok(Self { own, placed, is_placed })
+    }
+}
+
+/// Whether a file says where its samples are: a frame of unit steps at 0 is that of headers that say nothing.
+fn is_placed<const D: usize>(path: &Path, frame: &Frame<D>) -> bool {
+    let unit = Frame::new(frame.shape());
+    ImageFormat::of(path).is_some_and(ImageFormat::has_frame) && unit.as_ref() != Ok(frame)
+}
+
+/// Reads an image that belongs to the samples of the first: it is placed by its own frame where there is one, else by its
+/// shape. Its box of interest is taken.
 fn read_field<const D: usize>(
     run: &RunConfig,
     path: &Path,
+    of: &Samples<D>,
+    between: Between,
     dimension: &Dimension<D>,
     session: &mut Session<'_>,
 ) -> Result<Image<D>, JobError> {
@@ -134,5 +167,74 @@ fn read_field<const D: usize>(
         let message = format!("has {found} axes; expected {D}, as {}", name(run));
         return Err(JobError::content(message).about(path));
     };
+    let mut say = |text: String| {
+        session.note(Note { is_warning: false, file: Some(path.into()), text });
+    };
+    let field = onto(field, run, path, of, between, &mut say).map_err(|e| e.about(path))?;
     run.frame.place(field).map_err(|e| e.about(path))
+}
+
+/// The field at the samples of the image.
+fn onto<const D: usize>(
+    field: Image<D>,
+    run: &RunConfig,
+    path: &Path,
+    of: &Samples<D>,
+    between: Between,
+    say: &mut dyn FnMut(String),
+) -> Result<Image<D>, JobError> {
+    let (own, image) = (*field.frame(), name(run));
+    let is_placed = is_placed(path, &own);
+    if !(is_placed && of.is_placed) {
+        let (found, expected) = (own.shape(), of.own.shape());
+        if found != expected {
+            let message =
+                format!("has {found:?} samples (x first); expected {expected:?}, as {image}");
+            return Err(JobError::content(message));
+        }
+        if is_placed != of.is_placed {
+            let lacking = if is_placed { image.as_str() } else { "the file" };
+            say(format!("{lacking} does not say where its samples are; they are taken one by one"));
+        }
+        return field.with_frame(of.own).map_err(JobError::content);
+    }
+    // options move the image, and what lies where it lay with it; what lies where they put it stays
+    let order = [of.placed, of.own].iter().find_map(|frame| frame.order_in(&own));
+    if let Some(order) = order {
+        if !order.is_same() {
+            let axis = |k: usize| {
+                let sign = if order.is_flipped[k] { "-" } else { "" };
+                format!("{sign}{}", ["x", "y", "z"][order.axes[k]])
+            };
+            let axes = (0..D).map(axis).collect::<Vec<_>>().join(",");
+            say(format!(
+                "the axes of {image} run along {axes} of the file's; samples are reordered"
+            ));
+        }
+        return Ok(field.reordered(&of.own, order));
+    }
+    let (placed, outside) = field.resampled(&of.placed, between);
+    let all = of.placed.sample_count();
+    if outside == all {
+        let (own, placed) = (own.world_box(), of.placed.world_box());
+        let message =
+            format!("lies in {own}, all of it outside of {image}, which lies in {placed}");
+        return Err(JobError::content(message));
+    }
+    let how = match between {
+        Between::Nearest => "the nearest sample is taken",
+        Between::Linear { .. } => "values are linear between samples",
+    };
+    let rest = match (outside, between) {
+        (0, _) => String::new(),
+        (_, Between::Linear { outside: None }) => {
+            format!(
+                "; {outside} of {all} samples lie outside of the file and take its nearest value"
+            )
+        }
+        _ => format!("; {outside} of {all} samples lie outside of the file and are 0"),
+    };
+    say(format!("has other samples than {image}: {how}{rest}"));
+    let samples = placed.into_parts().1;
+    Image::new(of.own, samples).map_err(JobError::content)
 }

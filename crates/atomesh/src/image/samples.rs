@@ -236,6 +236,25 @@ impl Samples {
         count
     }
 
+    /// `count` samples, each the one whose index `from` gives, or 0; in the same type.
+    pub(super) fn picked(
+        &self,
+        count: usize,
+        from: impl Fn(usize) -> Option<usize> + Sync,
+    ) -> Self {
+        macro_rules! picked {
+            ($($kind:ident),*) => {
+                match self {
+                    $(Samples::$kind(v) => {
+                        let of = |index| from(index).map_or(Default::default(), |own| v[own]);
+                        Samples::$kind((0..count).into_par_iter().map(of).collect())
+                    })*
+                }
+            };
+        }
+        picked!(U8, I8, U16, I16, U32, I32, F32, F64)
+    }
+
     /// The samples of the index ranges one after another, `count` in all, in the same type.
     pub(super) fn gather(
         &self,
