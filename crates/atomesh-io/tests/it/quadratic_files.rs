@@ -1,6 +1,6 @@
 //! Cells of second order: written with all their nodes, read as the mesh of their corners.
 
-use atomesh::mesh::{Mesh, Quadratic};
+use atomesh::mesh::{FacetGroup, Mesh, Quadratic, Tags};
 use atomesh::watch::Silent;
 use atomesh_io::mesh::msh::{MshEncoding, MshVersion};
 use atomesh_io::mesh::{AnyMesh, MeshData, MeshFormat, read_mesh, write_mesh_as};
@@ -60,4 +60,28 @@ fn nodes_are_in_each_format_s_order() {
     assert_eq!(cell, "1 11 2 0 1 1 2 3 4 5 8 6 7 10 9");
     // VTK wants 01 12 20 03 13 23
     assert_eq!(quadratic.cells(), [0, 1, 2, 3, 4, 7, 5, 6, 8, 9]);
+}
+
+#[test]
+fn node_sets_of_abaqus_hold_the_nodes_between_corners() {
+    let points = vec![[0.0; 3], [2.0, 0.0, 0.0], [0.0, 2.0, 0.0], [0.0, 0.0, 2.0], [2.0; 3]];
+    let mesh = Mesh::new(points, vec![0, 1, 2, 3, 1, 2, 3, 4]).unwrap();
+    let quadratic = Quadratic::new(&mesh);
+    let group = |name: &str, facets| FacetGroup { id: 1, name: name.into(), facets };
+    let tags = Tags::new(&mesh, vec![group("bottom", vec![[0, 2, 1]])], None).unwrap();
+    let data = MeshData::new(&mesh).with_quadratic(&quadratic).with_tags(&tags);
+    let folder = tempfile::tempdir().unwrap();
+    let path = folder.path().join("two.inp");
+    write_mesh_as(&path, MeshFormat::Inp, &data, &mut Silent).unwrap();
+    let text = std::fs::read_to_string(&path).unwrap();
+    let set = text.lines().skip_while(|line| *line != "*NSET, NSET=bottom").nth(1).unwrap();
+    let middle = |a, b| quadratic.middle(a, b).unwrap() + 1;
+    let mut nodes = [1, 2, 3, middle(0, 1), middle(1, 2), middle(0, 2)];
+    nodes.sort_unstable();
+    let nodes: Vec<String> = nodes.iter().map(u32::to_string).collect();
+    assert_eq!(set, nodes.join(", "));
+    // read back, what is left are the corners, the cells between them and the group
+    let AnyMesh::Volume(read) = read_mesh(&path).unwrap() else { panic!() };
+    assert_eq!(read.mesh, mesh);
+    assert_eq!(read.tags.facet_groups(), tags.facet_groups());
 }

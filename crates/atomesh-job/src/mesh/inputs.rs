@@ -167,8 +167,8 @@ fn read_field<const D: usize>(
         let message = format!("has {found} axes; expected {D}, as {}", name(run));
         return Err(JobError::content(message).about(path));
     };
-    let mut say = |text: String| {
-        session.note(Note { is_warning: false, file: Some(path.into()), text });
+    let mut say = |is_warning, text: String| {
+        session.note(Note { is_warning, file: Some(path.into()), text });
     };
     let field = onto(field, run, path, of, between, &mut say).map_err(|e| e.about(path))?;
     run.frame.place(field).map_err(|e| e.about(path))
@@ -181,7 +181,7 @@ fn onto<const D: usize>(
     path: &Path,
     of: &Samples<D>,
     between: Between,
-    say: &mut dyn FnMut(String),
+    say: &mut dyn FnMut(bool, String),
 ) -> Result<Image<D>, JobError> {
     let (own, image) = (*field.frame(), name(run));
     let is_placed = is_placed(path, &own);
@@ -194,7 +194,10 @@ fn onto<const D: usize>(
         }
         if is_placed != of.is_placed {
             let lacking = if is_placed { image.as_str() } else { "the file" };
-            say(format!("{lacking} does not say where its samples are; they are taken one by one"));
+            say(
+                false,
+                format!("{lacking} does not say where its samples are; they are taken one by one"),
+            );
         }
         return field.with_frame(of.own).map_err(JobError::content);
     }
@@ -207,9 +210,12 @@ fn onto<const D: usize>(
                 format!("{sign}{}", ["x", "y", "z"][order.axes[k]])
             };
             let axes = (0..D).map(axis).collect::<Vec<_>>().join(",");
-            say(format!(
-                "the axes of {image} run along {axes} of the file's; samples are reordered"
-            ));
+            say(
+                false,
+                format!(
+                    "the axes of {image} run along {axes} of the file's; samples are reordered"
+                ),
+            );
         }
         return Ok(field.reordered(&of.own, order));
     }
@@ -234,7 +240,8 @@ fn onto<const D: usize>(
         }
         _ => format!("; {outside} of {all} samples lie outside of the file and are 0"),
     };
-    say(format!("has other samples than {image}: {how}{rest}"));
+    // half of the image without anything is more likely a mistake
+    say(2 * outside > all, format!("has other samples than {image}: {how}{rest}"));
     let samples = placed.into_parts().1;
     Image::new(of.own, samples).map_err(JobError::content)
 }

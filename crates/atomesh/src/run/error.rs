@@ -175,7 +175,7 @@ pub enum Warning {
         why: &'static str,
     },
     /// Facets are turned onto features, but no atoms put on them, where nobody asked for either.
-    #[error("no atoms are put on features, facets are turned onto them instead: {why}")]
+    #[error("facets are turned onto features, no atoms put on them: {why}")]
     TurnedOnly {
         /// What stands in the way.
         why: String,

@@ -72,7 +72,7 @@ impl<const D: usize> Found<D> {
     /// Features of which this share is clean.
     fn ragged(clean: f64) -> Self {
         let why = format!(
-            "features are ragged, {:.0} % of them clean {}; --align conform puts atoms on them all the same",
+            "these are ragged, {:.0} % of them clean {} (--align conform puts atoms there all the same)",
             100.0 * clean,
             if D == 2 { "lines" } else { "sheets" }
         );

@@ -55,7 +55,7 @@ pub(super) fn prepare<const D: usize>(
         }
         match why_not(&options, &grid, &distance, is_masked) {
             Some(why) if asked == Align::Conform => warnings.push(Warning::NotConforming { why }),
-            Some(why) if potential.range() != (0.0, 0.0) && options.kind == MeshKind::Delaunay => {
+            Some(why) if has_features(&inputs, &options) && options.kind == MeshKind::Delaunay => {
                 warnings.push(Warning::TurnedOnly { why: why.into() });
             }
             Some(_) => {}
@@ -153,6 +153,12 @@ fn coarse<const D: usize>(grid: &Grid<D>, distance: &NominalDistance<D>) -> Opti
     let (distance, extent) = (distance.least(), grid.bounds().extent());
     let axis = (0..D).find(|&k| distance > extent[k])?;
     Some(Warning::Coarse { axis, distance, extent: extent[axis] })
+}
+
+/// Whether features are asked for at all.
+fn has_features<const D: usize>(inputs: &Inputs<'_, D>, options: &MeshOptions<D>) -> bool {
+    let is_none = options.features.features == Features::None && options.mixture.is_none();
+    inputs.is_potential || !is_none
 }
 
 /// Why atoms cannot conform to features, if they cannot.

@@ -9,7 +9,7 @@ use super::super::read_error::{MeshReadError, malformed};
 use super::super::tags::plain_name;
 use super::{CELLS, face_number};
 
-/// Reads the triangles (CPS3, CPE3, S3 …) or tetrahedra (C3D4) of an Abaqus input file with numbers as text
+/// Reads the triangles (CPS3, CPE3, S3 …) or tetrahedra (C3D4), or the corners of those of second order (CPS6, C3D10 …), of an Abaqus input file with numbers as text
 /// and without parts or generated sets; element sets are regions and surfaces are groups of facets. Of an
 /// element in several sets the last counts. Other keywords are passed over.
 ///
@@ -33,7 +33,7 @@ enum Section {
     #[default]
     Other,
     Nodes,
-    /// Elements of so many corners, and the place of the set that they are in.
+    /// Elements of so many nodes, and the place of the set that they are in.
     Elements(usize, Option<usize>),
     /// The named set.
     Set(String),
@@ -135,7 +135,9 @@ impl Reader {
             "ELEMENT" => {
                 let count = match option("TYPE").as_str() {
                     "c3d4" => 4,
+                    "c3d10" => 10,
                     "cps3" | "cpe3" | "cax3" | "s3" | "stri3" => 3,
+                    "cps6" | "cpe6" | "cax6" | "s6" => 6,
                     _ => 0,
                 };
                 let name = option("ELSET");
@@ -198,12 +200,15 @@ impl Reader {
         Ok(())
     }
 
-    /// Keeps an element of `count` corners, and puts it into the set of a place; or says what is expected.
-    fn element(&mut self, numbers: &[u64], count: usize, set: Option<usize>) -> Result<(), String> {
+    /// Keeps the corners of an element of `nodes` nodes, which come first, and puts it into the set of a place; or says
+    /// what is expected.
+    fn element(&mut self, numbers: &[u64], nodes: usize, set: Option<usize>) -> Result<(), String> {
         let [number, corners @ ..] = numbers else { return Err("an element".into()) };
-        if corners.len() != count {
-            return Err(format!("an element of {count} nodes"));
+        if corners.len() != nodes {
+            return Err(format!("an element of {nodes} nodes"));
         }
+        let count = if matches!(nodes, 3 | 6) { 3 } else { 4 };
+        self.parts.has_quadratic |= nodes > count;
         let kept = match count {
             3 => &mut self.parts.triangles,
             _ => &mut self.parts.tetrahedra,
@@ -212,7 +217,7 @@ impl Reader {
         if let Some(set) = set {
             self.sets[set].1.push(*number);
         }
-        for corner in corners {
+        for corner in &corners[..count] {
             let index = self.index_of.get(corner).copied();
             kept.push(index.ok_or("nodes that stand before")?);
         }

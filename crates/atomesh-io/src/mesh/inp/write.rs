@@ -63,7 +63,7 @@ pub fn write_inp<const D: usize>(
     }
     if let Some(tags) = data.tags() {
         regions(&mut to, tags)?;
-        facet_groups(&mut to, mesh, tags)?;
+        facet_groups(&mut to, data, tags)?;
     }
     to.flush()
 }
@@ -88,14 +88,15 @@ fn regions<W: Write, const D: usize>(
 
 fn facet_groups<W: Write, const D: usize>(
     to: &mut Lines<W>,
-    mesh: &Mesh<D>,
+    data: &MeshData<D>,
     tags: &Tags<D>,
 ) -> Result<(), MeshWriteError> {
+    let mesh = data.mesh();
     let cells = mesh.cells_of_points();
     for group in tags.facet_groups() {
         let name = plain_name(&group.name);
-        let mut nodes: Vec<usize> =
-            group.facets.as_flattened().iter().map(|&corner| corner as usize + 1).collect();
+        let of_facets = group.facets.iter().flat_map(|facet| data.facet_nodes(facet));
+        let mut nodes: Vec<usize> = of_facets.map(|node| node as usize + 1).collect();
         nodes.sort_unstable();
         nodes.dedup();
         to.line(format_args!("**group {} {}", group.id, group.name))?;

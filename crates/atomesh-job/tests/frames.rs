@@ -1,0 +1,144 @@
+//! Masks, labels and fields lie where their own frames say.
+
+use std::path::{Path, PathBuf};
+
+use atomesh::image::{Frame, Image, Samples, Units};
+use atomesh::watch::Silent;
+use atomesh_io::image::write_image;
+use atomesh_job::mesh::MeshImages;
+use atomesh_job::options::{InputOptions, RunConfig};
+use atomesh_job::{Dimension, ErrorKind, JobError, Session};
+
+/// The ball, as labels: 1 inside of it.
+const CENTRE: [f64; 3] = [-3.0, 2.0, 1.0];
+
+fn ball(frame: Frame<3>) -> Image<3> {
+    let [nx, ny, _] = frame.shape();
+    let label = |index: usize| {
+        let sample = [index % nx, index / nx % ny, index / (nx * ny)].map(|i| i as f64);
+        let place = frame.lattice_to_world(Units::Samples, &sample);
+        let squared: f64 = (0..3).map(|k| (place[k] - CENTRE[k]).powi(2)).sum();
+        u8::from(squared < 16.0)
+    };
+    let samples = (0..frame.sample_count()).map(label).collect();
+    Image::new(frame, Samples::U8(samples)).unwrap()
+}
+
+fn frame(shape: [usize; 3], origin: [f64; 3]) -> Frame<3> {
+    Frame::new(shape).unwrap().with_origin(origin).unwrap()
+}
+
+struct Case {
+    folder: tempfile::TempDir,
+}
+
+impl Case {
+    fn new() -> Self {
+        let case = Self { folder: tempfile::tempdir().unwrap() };
+        case.write("image.nrrd", &ball(frame([16, 14, 12], [-8.0, -6.0, -5.0])));
+        case
+    }
+
+    fn write(&self, name: &str, image: &Image<3>) -> PathBuf {
+        let path = self.folder.path().join(name);
+        write_image(&path, image, &mut Silent).unwrap();
+        path
+    }
+
+    /// The labels as the mesh gets them, and what was said.
+    fn read(
+        &self,
+        labels: &Path,
+        change: impl Fn(&mut RunConfig),
+    ) -> Result<(Image<3>, Vec<String>), JobError> {
+        let image = self.folder.path().join("image.nrrd");
+        let input = InputOptions {
+            image: Some(image.clone()),
+            labels: Some(labels.into()),
+            ..Default::default()
+        };
+        let mut run = RunConfig { input, ..Default::default() };
+        run.lattice.size = Some("3".parse().unwrap());
+        change(&mut run);
+        let mut watch = Silent;
+        let mut session = Session::new(&mut watch);
+        let image = atomesh_job::mesh::read_shown(&run, &mut session)?;
+        let atomesh_io::image::AnyImage::Volume(image) = image else { panic!() };
+        let images = MeshImages::read_fields(&run, image, &Dimension::space(), &mut session)?;
+        let notes = session.notes().iter().map(ToString::to_string).collect();
+        Ok((images.labels.unwrap(), notes))
+    }
+}
+
+#[test]
+fn labels_stored_in_another_order_are_put_in_the_images() {
+    let case = Case::new();
+    let expected = ball(frame([16, 14, 12], [-8.0, -6.0, -5.0]));
+    let turned = Frame::new([12, 16, 14]).unwrap();
+    // x runs along −z, y along −x, z along y
+    let turned = turned.with_direction([[0.0, -1.0, 0.0], [0.0, 0.0, 1.0], [-1.0, 0.0, 0.0]]);
+    let turned = turned.unwrap().with_origin([7.0, -6.0, 6.0]).unwrap();
+    let path = case.write("labels.nrrd", &ball(turned));
+    let (labels, notes) = case.read(&path, |_| {}).unwrap();
+    assert_eq!(labels.samples(), expected.samples());
+    assert!(
+        matches!(&notes[..], [note] if note.contains("run along -y,z,-x of the file's")),
+        "{notes:?}"
+    );
+    let path = case.write("same.nrrd", &expected);
+    let (labels, notes) = case.read(&path, |_| {}).unwrap();
+    assert_eq!((labels.samples(), notes.len()), (expected.samples(), 0));
+    // options that move the image move what lies with it, and leave what lies where they put it
+    let moved = |run: &mut RunConfig| run.frame.origin = Some("100,0,0".parse().unwrap());
+    let there = Image::new(frame([16, 14, 12], [100.0, 0.0, 0.0]), expected.samples().clone());
+    for labels in [path, case.write("there.nrrd", &there.unwrap())] {
+        let (labels, notes) = case.read(&labels, moved).unwrap();
+        assert_eq!(
+            (labels.samples(), labels.frame().origin()),
+            (expected.samples(), [100.0, 0.0, 0.0])
+        );
+        assert!(notes.is_empty(), "{notes:?}");
+    }
+}
+
+#[test]
+fn labels_on_another_grid_are_taken_at_the_same_places() {
+    let case = Case::new();
+    let fine = frame([40, 40, 40], [-10.0, -8.0, -6.0]).with_spacing([0.5; 3]).unwrap();
+    let path = case.write("fine.nrrd", &ball(fine));
+    let (labels, notes) = case.read(&path, |_| {}).unwrap();
+    // every sample of the image is one of the fine grid's
+    assert_eq!(labels.samples(), ball(*labels.frame()).samples());
+    assert!(matches!(&notes[..], [note] if note.contains("nearest")), "{notes:?}");
+    let part = frame([8, 14, 12], [-8.0, -6.0, -5.0]);
+    let path = case.write("part.nrrd", &ball(part));
+    let (labels, notes) = case.read(&path, |_| {}).unwrap();
+    assert_eq!(labels.samples(), ball(*labels.frame()).samples()); // the ball ends at x = 1
+    assert!(
+        notes[0].contains("1344 of 2688 samples lie outside of the file and are 0"),
+        "{notes:?}"
+    );
+}
+
+#[test]
+fn labels_elsewhere_are_refused_with_both_boxes() {
+    let case = Case::new();
+    let path = case.write("far.nrrd", &ball(frame([16, 14, 12], [50.0, 0.0, 0.0])));
+    let error = case.read(&path, |_| {}).unwrap_err();
+    let text = error.to_string();
+    assert_eq!(error.kind(), ErrorKind::Content);
+    assert!(text.contains("50..65,0..13,0..11") && text.contains("-8..7,-6..7,-5..6"), "{text}");
+}
+
+#[test]
+fn labels_without_a_frame_are_taken_by_their_shape() {
+    let case = Case::new();
+    let expected = ball(frame([16, 14, 12], [-8.0, -6.0, -5.0]));
+    let path = case.write("labels.npy", &expected);
+    let (labels, notes) = case.read(&path, |_| {}).unwrap();
+    assert_eq!(labels.samples(), expected.samples());
+    assert!(matches!(&notes[..], [note] if note.contains("one by one")), "{notes:?}");
+    let path = case.write("short.npy", &ball(frame([16, 14, 11], [0.0; 3])));
+    let text = case.read(&path, |_| {}).unwrap_err().to_string();
+    assert!(text.contains("[16, 14, 11]") && text.contains("[16, 14, 12]"), "{text}");
+}
