@@ -24,17 +24,17 @@ section! {
         /// the features of IMAGE. With both, IMAGE gives the frame and the picture
         #[arg(long, value_name = "FILE")]
         pub potential: PathBuf,
-        /// Nominal distance d(x) in lattice units, an image of the same shape as IMAGE; replaces --size
+        /// Nominal distance d(x) in lattice units, an image over IMAGE; replaces --size
         #[arg(long, value_name = "FILE", conflicts_with = "size")]
         pub size_field: PathBuf,
-        /// Weight β(x), 0 to 1, an image of the same shape as IMAGE; replaces --beta
+        /// Weight β(x), 0 to 1, an image over IMAGE; replaces --beta
         #[arg(long, value_name = "FILE", conflicts_with = "beta")]
         pub beta_field: PathBuf,
-        /// Mask, an image of the same shape as IMAGE: mesh only where it is not 0 (where it is at least 0.5, if
+        /// Mask, an image over IMAGE: mesh only where it is not 0 (where it is at least 0.5, if
         /// its values are shares from 0 to 1), up to its smooth outline
         #[arg(long, value_name = "FILE")]
         pub mask: PathBuf,
-        /// Labels, an image of integers of the same shape as IMAGE: each cell gets the label that covers most
+        /// Labels, an image of integers over IMAGE: each cell gets the label that covers most
         /// of it, and facets between two labels are tagged, as interface-2-5. Without IMAGE, or with
         /// --features labels, atoms are attracted to the boundaries between labels
         #[arg(long, value_name = "FILE")]

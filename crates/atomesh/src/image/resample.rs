@@ -214,9 +214,12 @@ mod tests {
         let other = frame([6, 4, 5], turned, [-7.0, 6.0, 8.0]);
         let order = own.order_in(&other).unwrap();
         assert_eq!(order, SampleOrder { axes: [1, 2, 0], is_flipped: [false, true, true] });
-        assert_eq!(named(other).reordered(&own, order), named(own));
+        let is_named = |image: Image<3>, frame: Frame<3>| {
+            *image.frame() == frame && image.samples() == named(frame).samples()
+        };
+        assert!(is_named(named(other).reordered(&own, order), own));
         let back = other.order_in(&own).unwrap();
-        assert_eq!(named(own).reordered(&other, back), named(other));
+        assert!(is_named(named(own).reordered(&other, back), other));
         assert!(own.order_in(&own).unwrap().is_same());
         // a rounding of the header is none; a tenth of a sample is another place
         let near = own.with_origin([-6.995, 2.0, 3.0]).unwrap();
