@@ -187,3 +187,66 @@ fn ctrl_c_ends_a_run_within_a_second_and_leaves_no_half_file() {
         assert_eq!(names, ["noise.raw"]);
     }
 }
+
+#[test]
+fn seed_points_on_sides_leave_valid_meshes_whatever_their_decimals() {
+    let folder = tempfile::tempdir().unwrap();
+    let folder = folder.path();
+    succeed(folder, "synth faults -o flat.png --shape 40,32 -q");
+    succeed(folder, "synth sphere -o volume.npy --shape 14,12,10 -q");
+    // in doubles the sides are at 392.43 + 39 · 0.3 and so on, some above and some below the decimals
+    for (image, options) in [
+        (
+            "flat.png",
+            "--size 3.6 --spacing 0.3,1.2 --origin=392.43,-997.0 --seed-point=404.13,-981.88",
+        ),
+        (
+            "flat.png",
+            "--size 0.6 --spacing 0.1,0.1 --origin=1000.1,2000.3 --seed-point=1002.0,2000.3",
+        ),
+        (
+            "flat.png",
+            "--size 0.6 --spacing 0.1,0.1 --origin=1000.1,2000.3 --seed-point=1004.0,2003.4",
+        ),
+        (
+            "volume.npy",
+            "--size 0.9 --spacing 0.3,0.3,0.3 --origin=337.8,-293.75,154.8 --seed-point=341.7,-292.55,156.00",
+        ),
+        (
+            "volume.npy",
+            "--size 0.9 --spacing 0.3,0.3,0.3 --origin=337.8,-293.75,154.8 --seed-point=338.1,-290.45,157.5",
+        ),
+    ] {
+        succeed(folder, &format!("mesh {image} -o mesh.npz -q {options}"));
+        succeed(folder, "check mesh.npz");
+    }
+}
+
+#[test]
+fn samples_too_far_from_zero_are_refused() {
+    let folder = tempfile::tempdir().unwrap();
+    let folder = folder.path();
+    succeed(folder, "synth faults -o flat.png --shape 40,32 -q");
+    let output = atomesh(folder, "mesh flat.png -o mesh.npz -q --size 6 --origin=1e17,0");
+    let text = String::from_utf8_lossy(&output.stderr).into_owned();
+    assert_eq!(output.status.code(), Some(1), "{text}");
+    assert!(text.contains("1e17 along x") && text.contains("--origin"), "{text}");
+    succeed(folder, "mesh flat.png -o mesh.npz -q --size 6 --origin=6500000.25,500000");
+}
+
+#[cfg(unix)]
+#[test]
+fn names_that_are_no_text_are_written_and_reported() {
+    use std::os::unix::ffi::OsStrExt;
+    let folder = tempfile::tempdir().unwrap();
+    let folder = folder.path();
+    succeed(folder, "synth faults -o flat.png --shape 40,32 -q");
+    let report = std::ffi::OsStr::from_bytes(b"r\xff.json");
+    let page = std::ffi::OsStr::from_bytes(b"p\xff.html");
+    let mut command = Command::new(env!("CARGO_BIN_EXE_atomesh"));
+    command.current_dir(folder).args("mesh flat.png -q --size 6 -o mesh.vtu --report".split(' '));
+    let output = command.arg(report).arg("--html").arg(page).output().unwrap();
+    assert!(output.status.success(), "{}", String::from_utf8_lossy(&output.stderr));
+    assert!(json(&folder.join(report))["options"].is_object());
+    assert!(folder.join(page).exists());
+}

@@ -149,7 +149,7 @@ impl Figures {
             "memory_peak_bytes": memory::peak(),
             "threads": rayon::current_num_threads(),
             "warnings": warnings,
-            "options": run.clone().with_defaults::<D>(),
+            "options": run.clone().with_defaults::<D>().in_words(),
         })
     }
 }
@@ -173,7 +173,7 @@ impl<const D: usize> RunPage<'_, D> {
         session: &Session<'_>,
     ) -> Result<(), JobError> {
         let shape = self.outcome.frame().shape().map(|n| n.to_string()).join(" × ");
-        let options = serde_json::to_value(self.run.clone().with_defaults::<D>());
+        let options = serde_json::to_value(self.run.clone().with_defaults::<D>().in_words());
         let parts = PageParts {
             mesh,
             subtitle: format!(

@@ -23,6 +23,15 @@ pub fn refusal(run: &RunConfig, error: RunError) -> JobError {
         RunError::Lattice(LatticeError::SeedOutside { index, .. }) => {
             outside(run, *index).about_any(shown)
         }
+        RunError::Lattice(LatticeError::SeedsNear { first, second, .. }) => {
+            let [first, second] = [*first, *second].map(|index| seed_point(run, index));
+            JobError::misuse(format!("--seed-point {first} and {second} are nearly one place"))
+                .advise("give it once, or two that are farther apart")
+                .about_any(shown)
+        }
+        RunError::Frame { .. } => JobError::content(error)
+            .about_any(shown)
+            .advise("--origin puts the samples nearer to 0, where numbers are dense"),
         RunError::Enhance(EnhanceError::OutOfRange { .. })
         | RunError::Potential(FieldError::Potential { .. }) => {
             JobError::content(error).about_any(input.potential.as_deref().or(shown))
@@ -48,10 +57,15 @@ pub fn refusal(run: &RunConfig, error: RunError) -> JobError {
     }
 }
 
+/// A seed point as it was given.
+fn seed_point(run: &RunConfig, index: usize) -> String {
+    let point = run.lattice.seed_point.iter().flatten().nth(index);
+    point.map_or_else(String::new, ToString::to_string)
+}
+
 /// A seed point that is not in the image.
 fn outside(run: &RunConfig, index: usize) -> JobError {
-    let point = run.lattice.seed_point.iter().flatten().nth(index);
-    let point = point.map_or_else(String::new, ToString::to_string);
+    let point = seed_point(run, index);
     JobError::misuse(format!("--seed-point {point} lies outside the image"))
         .advise("places are in world coordinates; atomesh info IMAGE shows the box")
 }

@@ -100,6 +100,12 @@ impl<const D: usize> Writing<'_, D> {
     ) -> Result<Option<Tagged>, JobError> {
         let outcome = self.outcome;
         let mesh = outcome.world_mesh();
+        // no mesh leaves that is none, whatever went wrong before
+        mesh.validate().map_err(|fault| {
+            JobError::content(format!("the mesh would not be valid: {fault}"))
+                .advise("this is a fault of atomesh's own; another --size or --seed may avoid it")
+                .about_any(self.run.input.shown())
+        })?;
         let quadratic = self.outputs.is_quadratic.then(|| outcome.quadratic());
         let at_nodes = |values: &[f32]| match &quadratic {
             Some(quadratic) => quadratic.extend(values),

@@ -43,6 +43,11 @@ section! {
 }
 
 impl InputOptions {
+    pub(crate) fn files_mut(&mut self) -> [Option<&mut PathBuf>; 6] {
+        let Self { image, potential, size_field, beta_field, mask, labels } = self;
+        [image, potential, size_field, beta_field, mask, labels].map(Option::as_mut)
+    }
+
     /// All files that are read.
     pub fn paths(&self) -> impl Iterator<Item = &Path> {
         let all = [

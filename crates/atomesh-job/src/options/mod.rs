@@ -222,6 +222,17 @@ impl RunConfig {
         Self { lattice: without_seeds, ..self.clone() }.mesh_options::<2>().map(drop)
     }
 
+    /// The same with names of files that are no text spelt as nearly as text can, for reports.
+    pub(crate) fn in_words(mut self) -> Self {
+        let Self { input, output, .. } = &mut self;
+        for path in input.files_mut().into_iter().chain(output.files_mut()).flatten() {
+            if path.to_str().is_none() {
+                *path = path.to_string_lossy().into_owned().into();
+            }
+        }
+        self
+    }
+
     /// What decides the mesh beside the files, for its metadata: no paths.
     pub fn provenance<const D: usize>(&self) -> Provenance {
         let mut run = self.clone().with_defaults::<D>();

@@ -73,3 +73,10 @@ section! {
         pub write_potential: PathBuf,
     }
 }
+
+impl OutputOptions {
+    pub(crate) fn files_mut(&mut self) -> [Option<&mut PathBuf>; 6] {
+        let Self { output, connections, picture, report, html, write_potential, .. } = self;
+        [output, connections, picture, report, html, write_potential].map(Option::as_mut)
+    }
+}

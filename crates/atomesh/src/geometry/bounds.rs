@@ -131,12 +131,15 @@ impl<const D: usize> Bounds<D> {
         std::array::from_fn(|k| p[k].clamp(self.min[k], self.max[k]))
     }
 
-    /// The nearest point of the box, if it is within a rounding of `p`, 10⁻⁹ of the box's extent along each
-    /// axis; else `p`.
-    pub fn snap(&self, p: &Point<D>) -> Point<D> {
-        let (inside, extent) = (self.clamp(p), self.extent());
-        let near = (0..D).all(|k| (inside[k] - p[k]).abs() <= 1e-9 * extent[k]);
-        if near { inside } else { *p }
+    /// The point on the sides, edges or the corner that it is no farther from than `rounding`, or 10⁻⁹ of the box's extent
+    /// along an axis, from within or without; `p` itself if it is farther outside.
+    pub fn snap(&self, p: &Point<D>, rounding: f64) -> Point<D> {
+        let extent = self.extent();
+        let to = std::array::from_fn(|k| {
+            let near = |side: &f64| (p[k] - side).abs() <= rounding.max(1e-9 * extent[k]);
+            [self.min[k], self.max[k]].into_iter().find(near).unwrap_or(p[k])
+        });
+        if self.contains(&to) { to } else { *p }
     }
 }
 
@@ -164,8 +167,14 @@ mod tests {
     }
 
     #[test]
-    fn only_a_point_within_a_rounding_of_the_box_snaps_to_it() {
-        assert_eq!(BOX.snap(&[4.0 + 1e-9, 1.5, -2.0 - 1e-9]), [4.0, 1.5, -2.0]);
-        assert_eq!(BOX.snap(&[4.1, 1.5, -2.0 - 1e-9]), [4.1, 1.5, -2.0 - 1e-9]);
+    fn only_a_point_within_a_rounding_of_a_side_snaps_to_it() {
+        for sign in [1.0, -1.0] {
+            let near = [4.0 + sign * 1e-9, 1.5, -2.0 - sign * 1e-9];
+            assert_eq!(BOX.snap(&near, 0.0), [4.0, 1.5, -2.0]);
+            let near = [4.0 + sign * 1e-6, 1.5 + sign * 1e-6, 0.0];
+            assert_eq!(BOX.snap(&near, 0.0), near);
+            assert_eq!(BOX.snap(&near, 1e-5), [4.0, near[1], 0.0]);
+        }
+        assert_eq!(BOX.snap(&[4.1, 1.5, -2.0 - 1e-9], 0.0), [4.1, 1.5, -2.0 - 1e-9]);
     }
 }

@@ -105,13 +105,24 @@ impl<'a, const D: usize> Boundary<'a, D> {
                     max: bounds.max.to_vec(),
                 });
             }
-            if !self.lattice.atoms.contains(p) {
-                self.lattice.push(*p, 0, 0.0);
+            if self.lattice.atoms.contains(p) {
+                continue;
             }
+            let least = NEAREST * self.place.distance.at(p);
+            let mut others = self.lattice.atoms.iter();
+            if let Some(first) = others.position(|q| distance_squared(p, q) < least * least) {
+                let first =
+                    seeds.iter().position(|q| *q == self.lattice.atoms[first]).unwrap_or(first);
+                return Err(LatticeError::SeedsNear { first, second: index, least });
+            }
+            self.lattice.push(*p, 0, 0.0);
         }
         Ok(())
     }
 }
+
+/// Seed points nearer to each other than this, over d, are refused: rounded to a file's coordinates they might be one.
+const NEAREST: f64 = 1e-6;
 
 /// Where a line from `start` along `axis` to `end` is divided evenly in ∫dx/d, ends left out.
 fn even_steps<const D: usize>(

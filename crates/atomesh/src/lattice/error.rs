@@ -37,6 +37,18 @@ pub enum LatticeError {
         /// The box's greatest corner.
         max: Vec<f64>,
     },
+    /// Two seed points are nearly one, and are not.
+    #[error(
+        "seed points {first} and {second} are nearer to each other than {least:e}; expected one, or two that are farther apart"
+    )]
+    SeedsNear {
+        /// The place of one in the list.
+        first: usize,
+        /// That of the other.
+        second: usize,
+        /// The least distance, in lattice units.
+        least: f64,
+    },
     /// A coordinate of an atom is NaN or infinite.
     #[error("coordinate {} of atom {index} is {value}; expected a finite number", ["x", "y", "z"][*axis])]
     NotFinite {

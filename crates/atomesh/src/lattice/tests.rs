@@ -340,6 +340,10 @@ fn seeds_outside_and_odd_factors_are_refused() {
     let options = ScatterOptions { seed: 0, seed_points };
     let error = scatter(&Scatterer::<2>::new(), grid.bounds(), &distance, &options, &mut Silent);
     assert!(matches!(error.unwrap_err(), LatticeError::SeedOutside { index: 1, .. }));
+    let twice = vec![[3.0, 3.0], [9.0, 3.0], [3.0, 3.0], [9.0 + 1e-7, 3.0]];
+    let options = GrowOptions { seed_points: twice, ..Default::default() };
+    let error = grow(&crystal, grid.bounds(), &distance, &options, &mut Silent).unwrap_err();
+    assert!(matches!(error, LatticeError::SeedsNear { first: 1, second: 3, .. }), "{error}");
     let options = GrowOptions { seed_points: vec![[f64::NAN, 1.0]], ..Default::default() };
     let error = grow(&crystal, grid.bounds(), &distance, &options, &mut Silent).unwrap_err();
     assert!(matches!(error, LatticeError::SeedOutside { index: 0, .. }), "{error}");

@@ -84,12 +84,28 @@ impl<const D: usize> Mesh<D> {
         area_vector(&facet.map(|corner| self.points[corner as usize]))
     }
 
-    /// Calls `visit` with each facet as all of its cells have it, by ascending cells; facets come in lexicographic order.
-    pub(super) fn each_facet(&self, visit: impl FnMut(&[HalfFacet<D>])) {
-        self.each_facet_led_by(0..self.points.len() as u32, &self.cells_of_points(), visit);
+    /// What `find` finds first, of each facet as all of its cells have it, by ascending cells; facets come in lexicographic
+    /// order.
+    pub(super) fn first_of_facets<T: Send>(
+        &self,
+        find: impl Fn(&[HalfFacet<D>]) -> Option<T> + Sync,
+    ) -> Option<T> {
+        let cells = self.cells_of_points();
+        let of_block = |block: usize| {
+            let mut found = None;
+            let start = block * BLOCK;
+            let points = start as u32..self.points.len().min(start + BLOCK) as u32;
+            self.each_facet_led_by(points, &cells, |halves| {
+                found = found.take().or_else(|| find(halves));
+            });
+            found
+        };
+        let blocks = (0..self.points.len().div_ceil(BLOCK)).into_par_iter();
+        blocks.filter_map(of_block).find_first(|_| true)
     }
 
-    /// [`Self::each_facet`] for facets whose lowest corner is one of these points.
+    /// Calls `visit` with each facet whose lowest corner is one of these points, as all of its cells have it, by ascending
+    /// cells; facets come in lexicographic order.
     fn each_facet_led_by(
         &self,
         points: Range<u32>,

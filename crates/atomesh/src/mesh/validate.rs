@@ -1,5 +1,7 @@
 //! What a mesh promises, checked by exact arithmetic.
 
+use rayon::prelude::*;
+
 use super::Mesh;
 use super::facets::HalfFacet;
 
@@ -59,22 +61,18 @@ impl<const D: usize> Mesh<D> {
     /// # Errors
     /// The first fault, in this order.
     pub fn validate(&self) -> Result<(), MeshFault> {
-        for (cell, corners) in self.cells().enumerate() {
-            let simplex = self.simplex(corners);
+        let is_bad = |corners: &[u32]| {
             // Not `<= 0`: points too far apart for exact arithmetic could give NaN.
-            if !matches!(simplex.orientation().partial_cmp(&0.0), Some(std::cmp::Ordering::Greater))
-            {
-                let (corners, measure) = (corners.to_vec(), simplex.measure());
-                return Err(MeshFault::Orientation { cell, corners, measure });
-            }
+            let orientation = self.simplex(corners).orientation().partial_cmp(&0.0);
+            !matches!(orientation, Some(std::cmp::Ordering::Greater))
+        };
+        let cells = self.corners.par_chunks_exact(Self::CORNERS).with_min_len(1 << 10);
+        if let Some(cell) = cells.position_first(is_bad) {
+            let corners = &self.corners[cell * Self::CORNERS..(cell + 1) * Self::CORNERS];
+            let measure = self.simplex(corners).measure();
+            return Err(MeshFault::Orientation { cell, corners: corners.to_vec(), measure });
         }
-        let mut fault = None;
-        self.each_facet(|halves| {
-            if fault.is_none() {
-                fault = self.fault_of(halves);
-            }
-        });
-        if let Some(fault) = fault {
+        if let Some(fault) = self.first_of_facets(|halves| self.fault_of(halves)) {
             return Err(fault);
         }
         let mut used = vec![false; self.points.len()];
@@ -119,15 +117,13 @@ impl<const D: usize> Mesh<D> {
     /// # Errors
     /// [`MeshFault::NotDelaunay`] for the first facet that fails.
     pub fn check_delaunay(&self) -> Result<(), MeshFault> {
-        let mut fault = None;
-        self.each_facet(|halves| {
-            let [one, other] = halves else { return };
+        let fault = self.first_of_facets(|halves| {
+            let [one, other] = halves else { return None };
             let (cell, point) = (one.cell as usize, other.apex as usize);
             let at = cell * Self::CORNERS;
             let simplex = self.simplex(&self.corners[at..at + Self::CORNERS]);
-            if fault.is_none() && simplex.in_sphere(&self.points[point]) > 0.0 {
-                fault = Some(MeshFault::NotDelaunay { cell, point });
-            }
+            let is_inside = simplex.in_sphere(&self.points[point]) > 0.0;
+            is_inside.then_some(MeshFault::NotDelaunay { cell, point })
         });
         fault.map_or(Ok(()), Err)
     }

@@ -28,6 +28,19 @@ pub enum RunError {
         /// 0 for x, 1 for y, 2 for z.
         axis: usize,
     },
+    /// The samples are so far from 0 that coordinates cannot tell them apart well.
+    #[error(
+        "the samples lie as far as {value:e} along {}, where numbers are {:.1e} apart; expected a millionth of the \
+         spacing, {spacing}, or less", ["x", "y", "z"][*axis], value.abs() * f64::EPSILON
+    )]
+    Frame {
+        /// 0 for x, 1 for y, 2 for z.
+        axis: usize,
+        /// The greatest coordinate.
+        value: f64,
+        /// World units from one sample to the next.
+        spacing: f64,
+    },
     /// A lattice of another dimension.
     #[error("lattice {} does not exist in {dimension}-D; choose {}", .kind.name(), if *.dimension == 2 { "hexagonal or random" } else { "bcc, fcc or random" })]
     LatticeDimension {

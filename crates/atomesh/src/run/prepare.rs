@@ -5,7 +5,7 @@ use crate::enhance::{self, Enhanced, FeatureOptions, Features};
 use crate::fields::{
     Fields, GRADIENT_LIMIT, Grading, ImageWeight, NominalDistance, ScalarField, default_distance,
 };
-use crate::image::{Frame, Grid, Image, Samples};
+use crate::image::{Frame, Grid, Image, Samples, Units};
 use crate::improve::Align;
 use crate::region::{Outline, label_samples, samples_inside};
 use crate::watch::{Phase, Watch, check};
@@ -31,6 +31,7 @@ pub(super) fn prepare<const D: usize>(
     if let Some(axis) = (0..D).find(|&k| grid.shape[k] < 2) {
         return Err(RunError::Thin { axis });
     }
+    check_frame(&frame)?;
     method.crystal(options.lattice)?; // refuse early what does not fit the dimension
     let mut warnings = Vec::new();
     let labels = labels(&inputs)?;
@@ -153,6 +154,21 @@ fn coarse<const D: usize>(grid: &Grid<D>, distance: &NominalDistance<D>) -> Opti
     let (distance, extent) = (distance.least(), grid.bounds().extent());
     let axis = (0..D).find(|&k| distance > extent[k])?;
     Some(Warning::Coarse { axis, distance, extent: extent[axis] })
+}
+
+/// Refuses samples so far from 0 that points between them would fall together.
+fn check_frame<const D: usize>(frame: &Frame<D>) -> Result<(), RunError> {
+    /// How far apart numbers may be, over the least spacing.
+    const COARSEST: f64 = 1e-6;
+    let spacing = frame.spacing().into_iter().fold(f64::INFINITY, f64::min);
+    let last = frame.shape().map(|n| (n - 1) as f64);
+    let ends = [frame.origin(), frame.lattice_to_world(Units::Samples, &last)];
+    for (axis, value) in ends.iter().flat_map(|end| end.iter().copied().enumerate()) {
+        if value.abs() * f64::EPSILON > COARSEST * spacing {
+            return Err(RunError::Frame { axis, value, spacing });
+        }
+    }
+    Ok(())
 }
 
 /// Whether features are asked for at all.

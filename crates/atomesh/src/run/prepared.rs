@@ -275,12 +275,8 @@ pub(super) fn fill<const D: usize>(
         let least = distance.least();
         return Err(RunError::Memory { needed: estimate.memory, available, least });
     }
-    let (bounds, units) = (run.bounds(), options.units);
-    let seed_points: Vec<Point<D>> = (options.seed_points.iter())
-        .map(|p| frame.world_to_lattice(units, p))
-        // a point meant to be on the boundary may come back a rounding outside
-        .map(|p| bounds.snap(&p))
-        .collect();
+    let bounds = run.bounds();
+    let seed_points = options.seed_points.iter().map(|p| in_lattice(run, frame, p)).collect();
     let lattice = match method.crystal(options.lattice)? {
         Some(crystal) => {
             let spacing_factor = options.spacing_factor;
@@ -295,6 +291,20 @@ pub(super) fn fill<const D: usize>(
     };
     let order = compact_order(lattice.atoms());
     Ok(Filled::new(run.clone(), lattice.reordered(&order)))
+}
+
+/// A seed point from world to lattice. One that was meant to be on a side may come back a rounding from it, within or
+/// without: a cell between the two would be flat.
+fn in_lattice<const D: usize>(run: &Prepared<D>, frame: &Frame<D>, p: &Point<D>) -> Point<D> {
+    /// Nearer to a side than this, over d, a point is on it.
+    const NEAR: f64 = 1e-6;
+    let units = run.options().units;
+    let (spacing, step) = (frame.spacing(), frame.grid(units).step);
+    let largest = p.iter().chain(&frame.origin()).fold(0.0, |most: f64, x| most.max(x.abs()));
+    let scale = (0..D).map(|k| step[k] / spacing[k]).fold(0.0, f64::max);
+    let place = frame.world_to_lattice(units, p);
+    let rounding = 8.0 * f64::EPSILON * largest * scale;
+    run.bounds().snap(&place, rounding.max(NEAR * run.distance().at(&run.bounds().clamp(&place))))
 }
 
 /// Fills and settles a crystal that has grown where d varies.
