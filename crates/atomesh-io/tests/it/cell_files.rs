@@ -170,7 +170,7 @@ fn open_foam_s_folder_reads_back_closed_with_sides_and_features() {
         assert_eq!((read.cell_count(), read.face_count()), (foam.cell_count(), foam.face_count()));
         let names: Vec<&str> = read.patches().iter().map(|p| p.name.as_str()).collect();
         assert_eq!(names[..4], ["xmin", "xmax", "ymin", "ymax"]);
-        assert_eq!(read.face_zones()[0].name, "feature1");
+        assert_eq!(read.face_zones()[0].name, "feature-1");
         assert_eq!(read.face_zones()[0].faces.len(), 1);
     }
 }

@@ -52,11 +52,11 @@ section! {
             value_parser = number_in(0.0, 1000.0, "a number of samples from 0 to 1000"))]
         pub normal_scale: f64,
         /// Least strength of features where connected to stronger parts (hysteresis), 0 to 1. Default: 0.3 for
-        /// ridges, 0.15 for horizons and faults, 0.2 for edge crests
+        /// ridges, 0.15 for horizons and faults, 0.2 for edge crests, 0.07 for edges that atoms are put on
         #[arg(long, value_name = "SHARE", value_parser = number_in(0.0, 1.0, "a number from 0 to 1"))]
         pub low: f64,
         /// Strength that each feature must reach somewhere (hysteresis), 0 to 1. Default: 0.4 for horizons, 0.5 for
-        /// ridges, faults and edge crests
+        /// ridges, faults and edge crests, 0.2 for edges that atoms are put on
         #[arg(long, value_name = "SHARE", value_parser = number_in(0.0, 1.0, "a number from 0 to 1"))]
         pub high: f64,
         /// Least length of a feature in samples; in 3-D its square is the least area. Default: 10 for ridges and edge

@@ -10,6 +10,7 @@ use crate::geometry::Point;
 use crate::image::{Frame, Image, Samples};
 use crate::improve::{Align, ImproveOptions};
 use crate::watch::Silent;
+use rand::{RngExt, SeedableRng};
 
 /// What `grey` says at each sample.
 fn image<const D: usize>(shape: [usize; D], grey: impl Fn(Point<D>) -> f64) -> Image<D> {
@@ -301,6 +302,48 @@ fn facets_along_ragged_features_are_tagged_though_no_atoms_were_put_on_these() {
     let plain = run(&Method::plane(), &thicket(), MeshOptions { improve, ..options });
     assert_eq!(plain.mesh(), outcome.mesh());
     assert!(plain.tags().unwrap().facet_groups().iter().all(|g| !g.name.starts_with("feature-")));
+}
+
+#[test]
+fn boundaries_of_little_contrast_beside_noise_get_atoms_too() {
+    // grey rises by 160 at x = 40.3, and left of it by 32 at y = 30.6; noise of deviation 8
+    let mut random = rand_pcg::Pcg64::seed_from_u64(3);
+    let noise: Vec<f64> = (0..80 * 64)
+        .map(|_| (0..12).map(|_| random.random::<f64>() - 0.5).sum::<f64>() * 8.0)
+        .collect();
+    let rise = |x: f64| 1.0 / (1.0 + (-2.0 * x).exp());
+    let image = image([80, 64], |p| {
+        let weak = 32.0 * rise(p[1] - 30.6) * rise(40.3 - p[0]);
+        160.0 * rise(p[0] - 40.3) + weak + noise[p[1] as usize * 80 + p[0] as usize]
+    });
+    let options = MeshOptions {
+        improve: ImproveOptions { align: Align::Auto, ..ImproveOptions::for_dimension(2) },
+        ..conforming(5.0, Features::Edges)
+    };
+    let prepared = prepare(&Method::plane(), Inputs::image(&image), options, &mut Silent).unwrap();
+    let pieces = prepared.pieces().unwrap();
+    let is_met = |p: [f64; 2]| {
+        pieces
+            .foot(&p, 3.0)
+            .is_some_and(|foot| foot.beyond == 0.0 && foot.signed_distance(&p).abs() < 1.0)
+    };
+    for i in 4..32 {
+        assert!(is_met([f64::from(i), 30.6]), "{i}");
+        assert!(is_met([40.3, f64::from(2 * i)]), "{i}");
+    }
+}
+
+#[test]
+fn features_too_near_each_other_for_rows_are_not_given_any() {
+    let stripes = image([60, 50], |p| (std::f64::consts::TAU * p[0] / 3.2).cos());
+    let options = MeshOptions {
+        improve: ImproveOptions { align: Align::Auto, ..ImproveOptions::for_dimension(2) },
+        ..conforming(8.0, Features::Dark)
+    };
+    let prepared =
+        prepare(&Method::plane(), Inputs::image(&stripes), options, &mut Silent).unwrap();
+    assert!(prepared.pieces().is_none());
+    assert!(matches!(prepared.warnings(), [Warning::TurnedOnly { why }] if why.contains("apart")));
 }
 
 #[test]

@@ -41,6 +41,9 @@ const LEAST_CLEAN: [f64; 2] = [0.7, 0.6];
 /// planes and faults of synthetic images have 0.002 and less; a brain 0.019, a torso 0.04, a photograph of faults 0.09.
 const MOST_UNEXPLAINED: f64 = 0.006;
 
+/// Features nearer to each other than this in the mean, over d, have no room for rows of atoms on each.
+const CROWDED: f64 = 2.0 / 3.0;
+
 /// The share below which features that were looked for in a block of a volume alone are taken to be ragged everywhere.
 const RAGGED: f64 = 0.52;
 
@@ -69,6 +72,15 @@ pub(super) struct Found<const D: usize> {
 }
 
 impl<const D: usize> Found<D> {
+    /// Features so far apart in the mean, in samples.
+    fn crowded(apart: f64) -> Self {
+        let why = format!(
+            "these are {apart:.1} samples apart in the mean, nearer than two thirds of an edge; shorter edges, or \
+             --align conform, put atoms there"
+        );
+        Self { pieces: None, are_ragged: true, note: Some(Warning::TurnedOnly { why }) }
+    }
+
     /// Features of which this share is clean.
     fn ragged(clean: f64) -> Self {
         let why = format!(
@@ -108,6 +120,11 @@ pub(super) fn find_features<const D: usize>(
         return Ok(Found { are_ragged: true, ..Found::default() });
     }
     if is_asked {
+        // a point a sample: so many samples of the image for each are how far lines or sheets are apart
+        let apart = grid.sample_count() as f64 / points.len() as f64;
+        if apart < CROWDED * grid.in_samples(distance.mean()) {
+            return Ok(Found::crowded(apart));
+        }
         let found = Pieces::cleanness(&points, grid);
         if are_ragged(found, LEAST_CLEAN[D - 2]) {
             return Ok(Found::ragged(found.clean));

@@ -4,7 +4,7 @@ use std::fmt::Write as _;
 use std::io::{self, Write};
 use std::path::{Path, PathBuf};
 
-use atomesh::mesh::{boundary_connections, connections, side_name};
+use atomesh::mesh::{boundary_connections, connections, feature_name, side_name};
 use atomesh::watch::{Phase, Watch, check};
 use serde_json::json;
 
@@ -187,7 +187,7 @@ fn head<const D: usize>(list: &List<D>) -> String {
     let area = if D == 2 { "length" } else { "area" };
     let metadata: serde_json::Value = serde_json::from_str(&data.metadata()).unwrap_or_default();
     let features: Vec<_> = (data.features.areas.iter().enumerate())
-        .map(|(n, area)| json!({ "id": n + 1, "name": format!("feature{}", n + 1), "area": area }))
+        .map(|(n, area)| json!({ "id": n + 1, "name": feature_name(n as u32 + 1), "area": area }))
         .collect();
     let mut text = json!({
         "format": "atomesh connections",

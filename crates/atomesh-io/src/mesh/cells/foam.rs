@@ -1,13 +1,13 @@
 //! Polygons and polyhedra as OpenFOAM's polyMesh.
 
-use atomesh::mesh::side_name;
+use atomesh::mesh::{feature_name, side_name};
 
 use super::super::openfoam::{Beyond, FaceZone, FoamMesh, FoamMeshError, Patch};
 use super::CellData;
 
 impl FoamMesh {
     /// Cells with the sides of the box as patches, xmin, xmax, ymin ..., and their features as the face zones
-    /// `feature1`, `feature2` ... Polygons become prisms as high as the square root of their mean area.
+    /// `feature-1`, `feature-2` ... Polygons become prisms as high as the square root of their mean area.
     ///
     /// # Errors
     /// [`FoamMeshError`] never, for a mesh that keeps its promises.
@@ -42,17 +42,14 @@ impl FoamMesh {
         for feature in 1..=data.features.areas.len() as u32 {
             let of_faces = data.features.of_faces.iter().enumerate();
             let faces = of_faces.filter(|(_, f)| **f == feature).map(|(at, _)| (at as u32, false));
-            made.push_face_zone(FaceZone {
-                name: format!("feature{feature}"),
-                faces: faces.collect(),
-            })?;
+            made.push_face_zone(FaceZone { name: feature_name(feature), faces: faces.collect() })?;
         }
         Ok(made.with_note(&format!("{} {}", super::super::metadata::NAME, data.metadata())))
     }
 }
 
 /// Cells as a polyMesh: the sides of the box as patches xmin, xmax, ymin ..., features as the face zones
-/// `feature1`, `feature2` ... Polygons become prisms as high as the square root of their mean area.
+/// `feature-1`, `feature-2` ... Polygons become prisms as high as the square root of their mean area.
 ///
 /// # Errors
 /// [`FoamMeshError`] only if the mesh does not keep what it promises.

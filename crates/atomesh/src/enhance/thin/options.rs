@@ -44,7 +44,8 @@ pub struct CrestOptions {
     /// background and a full feature. Of horizons: 0.15, where 1 is the 98th percentile. Of edges: 0.2, where 1 is the
     /// 98th percentile of their gradients; with 0.1 atoms of a brain's mesh also followed what nobody would call an edge,
     /// at the cost of those that count. Of faults: a likelihood of 0.15; less finds more of where a fault dies out, and
-    /// more beside it.
+    /// more beside it. Atoms are put on edges of 0.07 and more, in groups that reach 0.2: what is weaker than noise is left
+    /// out anyway.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub low: Option<f64>,
     /// The least strength of the strongest crest of a group, 0…1. Default: 0.5; of horizons 0.4.
