@@ -70,7 +70,7 @@ impl<const D: usize> MeshImages<D> {
         let weight_field = field(&input.beta_field, Between::Linear { outside: None })?;
         let mask = field(&input.mask, Between::Nearest)?;
         let labels = field(&input.labels, Between::Nearest)?;
-        // without IMAGE, the potential is the image; where it says nothing there is no feature
+        // without IMAGE, the potential is the image; outside of its file there are no features
         let no_feature = Between::Linear { outside: Some(0.0) };
         let potential =
             if input.image.is_some() { field(&input.potential, no_feature)? } else { None };

@@ -71,7 +71,9 @@ pub fn connect<const D: usize>(
         }
         near.extend(cells.follow(delaunay, &points, &edits)?.added);
         for AtomEdit { atom, to } in edits {
-            points[atom as usize] = to.unwrap_or(points[atom as usize]);
+            if let Some(to) = to {
+                points[atom as usize] = to;
+            }
         }
         found = crossings(atoms.edges_near(&near, &cells, points.len(), pieces), &atoms, pieces);
         if found.is_empty() {

@@ -131,8 +131,8 @@ impl<const D: usize> Bounds<D> {
         std::array::from_fn(|k| p[k].clamp(self.min[k], self.max[k]))
     }
 
-    /// The point on the sides, edges or the corner that it is no farther from than `rounding`, or 10⁻⁹ of the box's extent
-    /// along an axis, from within or without; `p` itself if it is farther outside.
+    /// The point, moved onto each side that is within `rounding` of it, or within 10⁻⁹ of the box's extent along the axis
+    /// across that side. A point farther outside stays where it is.
     pub fn snap(&self, p: &Point<D>, rounding: f64) -> Point<D> {
         let extent = self.extent();
         let to = std::array::from_fn(|k| {

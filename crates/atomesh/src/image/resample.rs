@@ -4,7 +4,7 @@ use rayon::prelude::*;
 
 use super::place::coordinates;
 use super::{Frame, Image, Samples, Units};
-use crate::geometry::Point;
+use crate::geometry::{Bounds, Point};
 
 /// Samples this near to each other are at one place, in samples: headers are rounded.
 const SAME: f64 = 0.02;
@@ -54,30 +54,26 @@ impl<const D: usize> Frame<D> {
                 return None;
             }
         }
-        let is_there = |corner: usize| {
-            let last = |k: usize| (self.shape()[k] - 1) as f64;
-            let at = std::array::from_fn(|k| if corner >> k & 1 == 1 { last(k) } else { 0.0 });
-            let found = map.of(&at);
+        let bounds = self.grid(Units::Samples).bounds();
+        let is_there = |corner: Point<D>| {
+            let found = map.of(&corner);
             (0..D).all(|k| {
-                let expected = if order.is_flipped[k] { last(k) - at[k] } else { at[k] };
+                let end = bounds.max[k];
+                let expected = if order.is_flipped[k] { end - corner[k] } else { corner[k] };
                 (found[order.axes[k]] - expected).abs() <= SAME
             })
         };
-        (0..1 << D).all(is_there).then_some(order)
+        bounds.corners().all(is_there).then_some(order)
     }
 
     /// The box of the samples in the world, as `x0..x1,y0..y1[,z0..z1]`.
     pub fn world_box(&self) -> String {
-        let mut ends = [[f64::INFINITY, f64::NEG_INFINITY]; D];
-        for corner in 0..1usize << D {
-            let last = |k: usize| (self.shape()[k] - 1) as f64;
-            let at = std::array::from_fn(|k| if corner >> k & 1 == 1 { last(k) } else { 0.0 });
-            let place = self.lattice_to_world(Units::Samples, &at);
-            for k in 0..D {
-                ends[k] = [ends[k][0].min(place[k]), ends[k][1].max(place[k])];
-            }
-        }
-        ends.map(|[low, high]| format!("{low}..{high}")).join(",")
+        let corners = self.grid(Units::Samples).bounds().corners();
+        let places: Vec<Point<D>> =
+            corners.map(|corner| self.lattice_to_world(Units::Samples, &corner)).collect();
+        let bounds = Bounds::of(&places).expect("a box has corners");
+        let side = |k: usize| format!("{}..{}", bounds.min[k], bounds.max[k]);
+        (0..D).map(side).collect::<Vec<_>>().join(",")
     }
 }
 
@@ -88,9 +84,7 @@ impl<const D: usize> Image<D> {
             let samples = self.into_parts().1;
             return Self { frame: *frame, samples };
         }
-        let (own, shape) = (self.frame.shape(), frame.shape());
-        let mut strides = [1; D];
-        (1..D).for_each(|k| strides[k] = strides[k - 1] * own[k - 1]);
+        let (strides, shape) = (self.frame.grid(Units::Samples).strides(), frame.shape());
         let from = |index: usize| {
             let at = coordinates(index, shape);
             let along = |k: usize| {

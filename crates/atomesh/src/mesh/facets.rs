@@ -35,19 +35,28 @@ impl<const D: usize> Mesh<D> {
     /// All facets, in lexicographic order of their corners. Of more than two cells at a facet, a fault that
     /// [`Mesh::validate`] names, the two lowest are given. Cost: O(cells).
     pub fn facets(&self) -> Vec<Facet<D>> {
-        let cells = self.cells_of_points();
-        let of_block = |block: usize| {
+        let of_block = |points, cells: &CellsOfPoints| {
             let mut facets = Vec::new();
-            let start = block * BLOCK;
-            let points = start as u32..self.points.len().min(start + BLOCK) as u32;
-            self.each_facet_led_by(points, &cells, |halves| {
+            self.each_facet_led_by(points, cells, |halves| {
                 let neighbour = halves.get(1).map(|half| half.cell);
                 facets.push(Facet { corners: halves[0].corners, cell: halves[0].cell, neighbour });
             });
-            facets
+            Some(facets)
         };
-        let blocks = (0..self.points.len().div_ceil(BLOCK)).into_par_iter().map(of_block);
-        blocks.collect::<Vec<_>>().concat()
+        self.blocks(of_block).collect::<Vec<_>>().concat()
+    }
+
+    /// What `of_block` gives for each block of points and the cells of all points, on all threads.
+    fn blocks<T: Send>(
+        &self,
+        of_block: impl Fn(Range<u32>, &CellsOfPoints) -> Option<T> + Sync + Send,
+    ) -> impl ParallelIterator<Item = T> {
+        let cells = self.cells_of_points();
+        let count = self.points.len();
+        let blocks = (0..count.div_ceil(BLOCK)).into_par_iter().map(|block| block * BLOCK);
+        blocks.filter_map(move |start| {
+            of_block(start as u32..count.min(start + BLOCK) as u32, &cells)
+        })
     }
 
     /// The facet of a cell opposite to its corner number `opposite`, its normal out of the cell if the
@@ -88,20 +97,16 @@ impl<const D: usize> Mesh<D> {
     /// order.
     pub(super) fn first_of_facets<T: Send>(
         &self,
-        find: impl Fn(&[HalfFacet<D>]) -> Option<T> + Sync,
+        find: impl Fn(&[HalfFacet<D>]) -> Option<T> + Sync + Send,
     ) -> Option<T> {
-        let cells = self.cells_of_points();
-        let of_block = |block: usize| {
+        let of_block = |points, cells: &CellsOfPoints| {
             let mut found = None;
-            let start = block * BLOCK;
-            let points = start as u32..self.points.len().min(start + BLOCK) as u32;
-            self.each_facet_led_by(points, &cells, |halves| {
+            self.each_facet_led_by(points, cells, |halves| {
                 found = found.take().or_else(|| find(halves));
             });
             found
         };
-        let blocks = (0..self.points.len().div_ceil(BLOCK)).into_par_iter();
-        blocks.filter_map(of_block).find_first(|_| true)
+        self.blocks(of_block).find_first(|_| true)
     }
 
     /// Calls `visit` with each facet whose lowest corner is one of these points, as all of its cells have it, by ascending

@@ -113,12 +113,12 @@ fn improve_around<const D: usize>(
     let held = Held { freedom: &freedom, facets: &held, near: None };
     let (mut mesh, mut report) = improver.improve(mesh, held, fields, &tried, watch)?;
     for rings in RELEASES {
-        let is_released = near_bad_cells(&mesh, options.min_angle, rings);
+        let is_released = widened(&mesh, corners_of_bad_cells(&mesh, options.min_angle), rings);
         if !is_released.contains(&true) {
             (report.below, report.floor_held) = (0, true);
             break;
         }
-        let near = near_bad_cells(&mesh, options.min_angle, rings + AROUND);
+        let near = widened(&mesh, is_released.clone(), AROUND);
         let mut held = facets(&mesh);
         held.retain(|facet| !facet.iter().any(|&corner| is_released[corner as usize]));
         let mut is_held = vec![false; mesh.points().len()];
@@ -136,18 +136,30 @@ fn improve_around<const D: usize>(
     Ok((mesh, report))
 }
 
-/// The corners of cells with an angle below the floor, and, `rings` times, those of the cells around them.
-fn near_bad_cells<const D: usize>(mesh: &Mesh<D>, floor: f64, rings: usize) -> Vec<bool> {
-    let cells = mesh.corners().par_chunks_exact(D + 1).with_min_len(1 << 10);
-    let is_bad = |cell: &&[u32]| cell_shape(&mesh.simplex(cell).edges()).least_angle < floor;
-    let mut found: Vec<&[u32]> = cells.clone().filter(is_bad).collect();
+/// The corners of cells with an angle below the floor.
+fn corners_of_bad_cells<const D: usize>(mesh: &Mesh<D>, floor: f64) -> Vec<bool> {
+    let is_bad = |cell: &[u32]| cell_shape(&mesh.simplex(cell).edges()).least_angle < floor;
     let mut is_near = vec![false; mesh.points().len()];
-    for ring in 0..=rings {
-        if ring > 0 {
-            let has_near = |cell: &&[u32]| cell.iter().any(|&corner| is_near[corner as usize]);
-            found = cells.clone().filter(has_near).collect();
-        }
-        found.iter().copied().flatten().for_each(|&corner| is_near[corner as usize] = true);
-    }
+    mark(mesh, &mut is_near, |_, cell| is_bad(cell));
     is_near
+}
+
+/// The marked points and, `rings` times, the corners of the cells around them.
+fn widened<const D: usize>(mesh: &Mesh<D>, mut marks: Vec<bool>, rings: usize) -> Vec<bool> {
+    for _ in 0..rings {
+        let has_mark = |marks: &[bool], cell: &[u32]| cell.iter().any(|&c| marks[c as usize]);
+        mark(mesh, &mut marks, has_mark);
+    }
+    marks
+}
+
+/// Marks the corners of some cells.
+fn mark<const D: usize>(
+    mesh: &Mesh<D>,
+    marks: &mut [bool],
+    is_wanted: impl Fn(&[bool], &[u32]) -> bool + Sync,
+) {
+    let cells = mesh.corners().par_chunks_exact(D + 1).with_min_len(1 << 10);
+    let found: Vec<&[u32]> = cells.filter(|cell| is_wanted(marks, cell)).collect();
+    found.into_iter().flatten().for_each(|&corner| marks[corner as usize] = true);
 }

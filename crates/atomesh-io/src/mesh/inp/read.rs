@@ -9,8 +9,8 @@ use super::super::read_error::{MeshReadError, malformed};
 use super::super::tags::plain_name;
 use super::{CELLS, face_number};
 
-/// Reads the triangles (CPS3, CPE3, S3 …) or tetrahedra (C3D4), or the corners of those of second order (CPS6, C3D10 …), of an Abaqus input file with numbers as text
-/// and without parts or generated sets; element sets are regions and surfaces are groups of facets. Of an
+/// Reads the triangles (CPS3, CPE3, S3 …) or tetrahedra (C3D4), or the corners of those of second order (CPS6,
+/// C3D10 …), of an Abaqus input file with numbers as text and without parts or generated sets; element sets are regions and surfaces are groups of facets. Of an
 /// element in several sets the last counts. Other keywords are passed over.
 ///
 /// # Errors
@@ -33,7 +33,7 @@ enum Section {
     #[default]
     Other,
     Nodes,
-    /// Elements of so many nodes, and the place of the set that they are in.
+    /// Elements: how many nodes each has, and the place of the set that they are in.
     Elements(usize, Option<usize>),
     /// The named set.
     Set(String),

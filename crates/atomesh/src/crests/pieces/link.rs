@@ -158,7 +158,7 @@ pub(super) struct Around {
 }
 
 impl Around {
-    /// Of pairs of so many points.
+    /// Lists the pairs of `count` points by each of the two.
     pub(super) fn new(count: usize, pairs: &[[u32; 2]]) -> Self {
         let mut starts = vec![0; count + 1];
         pairs.iter().flatten().for_each(|&i| starts[i as usize + 1] += 1);
