@@ -2,54 +2,61 @@
 
 use std::fs::File;
 use std::io::{self, BufWriter, Seek, SeekFrom, Write};
-use std::path::{Path, PathBuf};
+use std::path::Path;
 
 use tempfile::NamedTempFile;
+
+use crate::place::{Place, hand_on};
 
 /// A file under construction: bytes go to a hidden file in the same folder, which takes the wanted
 /// name in [`commit`](Self::commit). Dropped without that, it is removed, and what was there before
 /// stays untouched. Writes are buffered.
 ///
-/// A link is followed, so that it goes on pointing to the new file. Devices and pipes (`/dev/null`,
-/// `/dev/stdout`) have no name to take: they are written to directly, and writers that seek fail
-/// there if the system says so.
+/// A link is followed, so that it goes on pointing to the new file; a file that is replaced leaves its
+/// permissions. Devices and pipes (`/dev/null`) have no name to take: they are handed all bytes at the end, so that
+/// writers may seek.
 #[derive(Debug)]
 pub struct AtomicFile {
     out: BufWriter<Target>,
-    path: PathBuf,
+    place: Place,
 }
 
 /// Where the bytes go until the commit.
 #[derive(Debug)]
 enum Target {
-    /// A regular file: renamed at the end.
-    Temporary(NamedTempFile),
-    /// A device or a pipe.
-    Direct(File),
+    /// Renamed at the end.
+    Named(NamedTempFile),
+    /// Copied at the end.
+    Unnamed(File),
+}
+
+impl Target {
+    fn file(&mut self) -> &mut File {
+        match self {
+            // the file itself, whose errors do not name it: the random name says nothing to the user
+            Self::Named(file) => file.as_file_mut(),
+            Self::Unnamed(file) => file,
+        }
+    }
 }
 
 impl AtomicFile {
     /// Starts a file that will be called `path`.
     ///
     /// # Errors
-    /// If `path` is a folder, or its folder does not exist or may not be written to.
+    /// If `path` is a folder or leads to what cannot be written, or its folder does not exist or may not be written to.
     pub fn create(path: &Path) -> io::Result<Self> {
-        let (path, target) = match path.metadata() {
-            Ok(m) if m.is_dir() => return Err(io::Error::from(io::ErrorKind::IsADirectory)),
-            Ok(m) if m.is_file() => {
-                let path = path.canonicalize()?;
-                let file = temporary_beside(&path)?;
-                (path, Target::Temporary(file))
-            }
-            Ok(_) => (path.into(), Target::Direct(File::options().write(true).open(path)?)),
-            Err(_) => (path.into(), Target::Temporary(temporary_beside(path)?)),
+        let place = Place::of(path)?;
+        let target = match &place {
+            Place::File(file) => Target::Named(temporary_in(file.folder())?),
+            Place::Stream(_) => Target::Unnamed(tempfile::tempfile()?),
         };
-        Ok(Self { out: BufWriter::with_capacity(1 << 18, target), path })
+        Ok(Self { out: BufWriter::with_capacity(1 << 18, target), place })
     }
 
     /// The name that the file will have.
     pub fn path(&self) -> &Path {
-        &self.path
+        self.place.path()
     }
 
     /// Writes what is buffered and gives the file its name, replacing a file of that name.
@@ -57,34 +64,39 @@ impl AtomicFile {
     /// # Errors
     /// If the disk is full or the name cannot be taken; the unfinished file is then removed.
     pub fn commit(self) -> io::Result<()> {
-        match self.out.into_inner().map_err(|e| e.into_error())? {
-            Target::Temporary(file) => file.persist(&self.path).map(drop).map_err(|e| e.error),
-            Target::Direct(_) => Ok(()),
+        let target = self.out.into_inner().map_err(|e| e.into_error())?;
+        match target {
+            Target::Named(file) => {
+                if let Place::File(place) = &self.place {
+                    place.dress(file.path())?;
+                }
+                file.persist(self.place.path()).map(drop).map_err(|e| e.error)
+            }
+            Target::Unnamed(mut file) => hand_on(&mut file, self.place.path()),
         }
     }
 }
 
-/// An unnamed-as-yet file in the folder of `path`, readable by those whom the umask allows.
-fn temporary_beside(path: &Path) -> io::Result<NamedTempFile> {
-    if path.file_name().is_none() {
-        return Err(io::Error::new(io::ErrorKind::InvalidInput, "the path names no file"));
-    }
-    let folder = match path.parent() {
-        Some(p) if !p.as_os_str().is_empty() => p,
-        _ => Path::new("."),
-    };
-    if !folder.metadata()?.is_dir() {
-        return Err(io::Error::from(io::ErrorKind::NotADirectory));
-    }
+/// How the names of unfinished files and folders begin and end.
+pub(crate) const UNFINISHED: [&str; 2] = [".atomesh-", ".part"];
+
+/// An unnamed-as-yet file in a folder, readable by those whom the umask allows.
+fn temporary_in(folder: &Path) -> io::Result<NamedTempFile> {
     let mut builder = tempfile::Builder::new();
-    builder.prefix(".atomesh-").suffix(".part");
+    builder.prefix(UNFINISHED[0]).suffix(UNFINISHED[1]);
     #[cfg(unix)]
     {
         use std::os::unix::fs::PermissionsExt;
         builder.permissions(std::fs::Permissions::from_mode(0o666));
     }
-    // the random name says nothing to the user: only the reason is kept
-    builder.tempfile_in(folder).map_err(|e| io::Error::from(e.kind()))
+    builder.tempfile_in(folder).map_err(without_name)
+}
+
+/// The error of a temporary file without its name, which is random and says nothing to the user.
+pub(crate) fn without_name(error: io::Error) -> io::Error {
+    let inner = error.get_ref().and_then(|e| e.source()?.downcast_ref::<io::Error>());
+    let code = inner.and_then(io::Error::raw_os_error);
+    code.map_or_else(|| error.kind().into(), io::Error::from_raw_os_error)
 }
 
 impl Write for AtomicFile {
@@ -105,26 +117,17 @@ impl Seek for AtomicFile {
 
 impl Write for Target {
     fn write(&mut self, bytes: &[u8]) -> io::Result<usize> {
-        match self {
-            Target::Temporary(file) => file.write(bytes),
-            Target::Direct(file) => file.write(bytes),
-        }
+        self.file().write(bytes)
     }
 
     fn flush(&mut self) -> io::Result<()> {
-        match self {
-            Target::Temporary(file) => file.flush(),
-            Target::Direct(file) => file.flush(),
-        }
+        self.file().flush()
     }
 }
 
 impl Seek for Target {
     fn seek(&mut self, to: SeekFrom) -> io::Result<u64> {
-        match self {
-            Target::Temporary(file) => file.seek(to),
-            Target::Direct(file) => file.seek(to),
-        }
+        self.file().seek(to)
     }
 }
 
@@ -191,5 +194,28 @@ mod tests {
         file.write_all(b"x").unwrap();
         file.commit().unwrap();
         assert!(Path::new("/dev/null").metadata().unwrap().file_type().is_char_device());
+    }
+
+    #[cfg(target_os = "linux")]
+    #[test]
+    fn a_device_that_is_full_says_so() {
+        let mut file = AtomicFile::create(Path::new("/dev/full")).unwrap();
+        file.write_all(b"x").unwrap();
+        assert_eq!(file.commit().unwrap_err().kind(), io::ErrorKind::StorageFull);
+    }
+
+    #[cfg(unix)]
+    #[test]
+    fn a_new_file_has_the_permissions_of_any_and_a_replaced_one_leaves_its_own() {
+        use std::os::unix::fs::PermissionsExt;
+        let folder = tempfile::tempdir().unwrap();
+        let mode = |path: &Path| path.metadata().unwrap().permissions().mode() & 0o7777;
+        let (plain, path) = (folder.path().join("plain"), folder.path().join("new"));
+        File::create(&plain).unwrap();
+        AtomicFile::create(&path).unwrap().commit().unwrap();
+        assert_eq!(mode(&path), mode(&plain));
+        fs::set_permissions(&path, fs::Permissions::from_mode(0o604)).unwrap();
+        AtomicFile::create(&path).unwrap().commit().unwrap();
+        assert_eq!(mode(&path), 0o604);
     }
 }

@@ -4,6 +4,8 @@ pub mod atomic_file;
 mod files;
 pub mod image;
 pub mod mesh;
+pub mod output_group;
+pub mod place;
 pub mod surface;
 
 pub use files::{MeshFiles, PointValue};

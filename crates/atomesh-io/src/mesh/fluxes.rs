@@ -8,7 +8,7 @@ use atomesh::image::Frame;
 use atomesh::watch::{Phase, Watch, check};
 use serde_json::json;
 
-use super::cells::connections::{put, vector};
+use super::cells::connections::{put, table_beside, vector};
 use super::error::MeshWriteError;
 use super::metadata;
 use super::provenance::Provenance;
@@ -59,8 +59,7 @@ pub struct FluxFiles {
 impl FluxFiles {
     /// The files for the head `NAME.json`: NAME-facets.csv beside it.
     pub fn of(head: &Path) -> Self {
-        let stem = head.file_stem().unwrap_or_default().to_string_lossy().into_owned();
-        Self { head: head.into(), facets: head.with_file_name(format!("{stem}-facets.csv")) }
+        Self { head: head.into(), facets: table_beside(head, "facets") }
     }
 
     /// Both of them.

@@ -28,8 +28,7 @@ pub struct ConnectionFiles {
 impl ConnectionFiles {
     /// The files for the head `NAME.json`: NAME-cells.csv, NAME-connections.csv and NAME-boundary.csv beside it.
     pub fn of(head: &Path) -> Self {
-        let stem = head.file_stem().unwrap_or_default().to_string_lossy().into_owned();
-        let table = |name: &str| head.with_file_name(format!("{stem}-{name}.csv"));
+        let table = |name: &str| table_beside(head, name);
         Self {
             head: head.into(),
             cells: table("cells"),
@@ -42,6 +41,13 @@ impl ConnectionFiles {
     pub fn paths(&self) -> [&Path; 4] {
         [&self.head, &self.cells, &self.connections, &self.boundary]
     }
+}
+
+/// The file NAME-table.csv beside the head NAME.json.
+pub(in super::super) fn table_beside(head: &Path, table: &str) -> PathBuf {
+    let mut name = head.file_stem().unwrap_or_default().to_owned();
+    name.push(format!("-{table}.csv"));
+    head.with_file_name(name)
 }
 
 /// How much flows, for the lists that say it.
