@@ -6,7 +6,7 @@ use atomesh::enhance::{Enhanced, FeatureOptions, Mixture};
 use atomesh::image::{Image, Samples, Units};
 use atomesh::mesh::Mesh;
 use atomesh::watch::{Phase, check};
-use atomesh_draw::Style;
+use atomesh_draw::{Picture, Style};
 use atomesh_io::image::AnyImage;
 
 use crate::dimension::Dimension;
@@ -127,15 +127,30 @@ fn run<const D: usize>(
         session.warn(Some(&request.image), text);
     }
     let Potential { image: potential, mixture, .. } = potential;
-    if let Some(file) = picture {
-        session.begin(Phase::Draw);
-        let nothing = Mesh::new(Vec::new(), Vec::new()).map_err(JobError::content)?;
-        let style = Style { units, brightness: 1.0, edge_pixels: 4.0, ..Style::default() };
-        let drawn =
-            (dimension.drawing.mesh)(&potential, &nothing, &style).map_err(JobError::content)?;
-        session.writing(|_| file.write(&drawn))?;
-    }
+    let drawn = match picture {
+        Some(_) => Some(draw(&potential, units, dimension, session)?),
+        None => None,
+    };
     check(session, Phase::Write, 0.0, None).map_err(|_| JobError::cancelled())?;
-    session.writing(|session| (dimension.files.image)(&request.output, &potential, session))?;
+    session.write_together(|group, session| {
+        if let (Some(file), Some(drawn)) = (picture, &drawn) {
+            file.staged(group)?.write(drawn)?;
+        }
+        let path = files::stage(&request.output, group)?;
+        Ok((dimension.files.image)(&path, &potential, session)?)
+    })?;
     Ok(EnhanceSummary { mixture, shape: potential.frame().shape().to_vec() })
+}
+
+/// The potential as a picture.
+fn draw<const D: usize>(
+    potential: &Image<D>,
+    units: Units,
+    dimension: &Dimension<D>,
+    session: &mut Session<'_>,
+) -> Result<Picture, JobError> {
+    session.begin(Phase::Draw);
+    let nothing = Mesh::new(Vec::new(), Vec::new()).map_err(JobError::content)?;
+    let style = Style { units, brightness: 1.0, edge_pixels: 4.0, ..Style::default() };
+    (dimension.drawing.mesh)(potential, &nothing, &style).map_err(JobError::content)
 }

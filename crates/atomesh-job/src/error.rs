@@ -1,6 +1,7 @@
 //! Why a job is not done: what kind of reason, about which file, and what the user might do.
 
 use std::fmt;
+use std::io;
 use std::path::{Path, PathBuf};
 
 use atomesh::enhance::EnhanceError;
@@ -36,6 +37,8 @@ pub enum ErrorKind {
     Memory,
     /// The [`Watch`](atomesh::watch::Watch) ended the work.
     Cancelled,
+    /// The reader of standard output or of a pipe went away.
+    ClosedPipe,
 }
 
 impl JobError {
@@ -56,6 +59,27 @@ impl JobError {
     /// A file that cannot be read or written.
     pub fn file(message: impl fmt::Display) -> Self {
         Self::new(ErrorKind::File, message)
+    }
+
+    /// A file that the system does not let be written, with what might help.
+    pub fn unwritable(error: &io::Error) -> Self {
+        use io::ErrorKind::{
+            BrokenPipe, FileTooLarge, InvalidFilename, NotFound, PermissionDenied, QuotaExceeded,
+            ReadOnlyFilesystem, StorageFull,
+        };
+        let refusal = Self::file(format!("cannot be written: {error}"));
+        match error.kind() {
+            BrokenPipe => Self::new(ErrorKind::ClosedPipe, "the reader went away"),
+            StorageFull | QuotaExceeded => refusal.advise("make room, or choose another folder"),
+            FileTooLarge => refusal.advise("the limit on file sizes (ulimit -f) is too low"),
+            InvalidFilename => refusal.advise("choose a shorter name"),
+            // a link that leads nowhere has its own words
+            NotFound if error.get_ref().is_none() => refusal.advise("make its folder first"),
+            PermissionDenied | ReadOnlyFilesystem => {
+                refusal.advise("choose a folder that may be written to")
+            }
+            _ => refusal,
+        }
     }
 
     /// Work that does not fit into memory.
@@ -79,6 +103,13 @@ impl JobError {
         if self.kind != ErrorKind::Cancelled {
             self.file.get_or_insert_with(|| file.into());
         }
+        self
+    }
+
+    /// The same, about the file that `other` gives for the one it is about, if it gives one.
+    pub(crate) fn renamed(mut self, other: impl FnOnce(&Path) -> Option<PathBuf>) -> Self {
+        let renamed = self.file.as_deref().and_then(other);
+        self.file = renamed.or(self.file);
         self
     }
 
@@ -195,7 +226,7 @@ impl From<MeshWriteError> for JobError {
     fn from(error: MeshWriteError) -> Self {
         match error {
             MeshWriteError::Cancelled(_) => Self::cancelled(),
-            MeshWriteError::Io(_) => Self::file(error),
+            MeshWriteError::Io(e) => Self::unwritable(&e),
             _ => Self::content(error),
         }
     }
@@ -205,7 +236,7 @@ impl From<SurfaceWriteError> for JobError {
     fn from(error: SurfaceWriteError) -> Self {
         match error {
             SurfaceWriteError::Cancelled(_) => Self::cancelled(),
-            SurfaceWriteError::Io(_) => Self::file(error),
+            SurfaceWriteError::Io(e) => Self::unwritable(&e),
             _ => Self::content(error),
         }
     }
@@ -216,7 +247,7 @@ impl From<WriteError> for JobError {
         let WriteError { path, reason, .. } = error;
         match reason {
             WriteReason::Cancelled(_) => Self::cancelled(),
-            WriteReason::Io(_) => Self::file(reason),
+            WriteReason::Io(e) => Self::unwritable(&e),
             _ => Self::content(reason),
         }
         .about(&path)

@@ -7,10 +7,12 @@ use atomesh_io::mesh::cells::{
     AnyCells, CellData, CellReadError, ConnectionFiles, Flow, LoadedCells, ModflowFiles, Rock,
     read_cells,
 };
+use atomesh_io::output_group::OutputGroup;
 
 use crate::dimension::Dimension;
 use crate::error::JobError;
 use crate::files::{self, unknown_extension};
+use crate::mesh::staged_list;
 use crate::permeability;
 use crate::session::Session;
 use crate::values::BarrierSpec;
@@ -81,13 +83,33 @@ enum ExportFormat {
 impl ExportFormat {
     fn of(request: &ExportRequest) -> Result<Self, JobError> {
         let path = request.output.as_path();
+        files::refuse_standard_output(path, "all that is exported is several")?;
         let modflow = || ModflowFiles::of(path, !request.barrier.is_empty());
         let extension = path.extension().unwrap_or_default().to_ascii_lowercase();
         match extension.to_str() {
-            Some("json") => Ok(Self::Connections(ConnectionFiles::of(path))),
+            Some("json") => {
+                files::check_head(path)?;
+                Ok(Self::Connections(ConnectionFiles::of(path)))
+            }
             Some("disv") => Ok(Self::Disv(modflow())),
             Some("disu") => Ok(Self::Disu(modflow())),
             _ => Err(unknown_extension(path, ".json (connections), .disv, .disu (MODFLOW 6)")),
+        }
+    }
+
+    /// The same files, written to where the group says.
+    fn staged(&self, group: &mut OutputGroup) -> Result<Self, JobError> {
+        let mut modflow = |files: &ModflowFiles| {
+            Ok(ModflowFiles {
+                grid: files::stage(&files.grid, group)?,
+                npf: files::stage(&files.npf, group)?,
+                hfb: files::stage_any(&files.hfb, group)?,
+            })
+        };
+        match self {
+            Self::Connections(files) => Ok(Self::Connections(staged_list(files, group)?)),
+            Self::Disv(files) => modflow(files).map(Self::Disv),
+            Self::Disu(files) => modflow(files).map(Self::Disu),
         }
     }
 
@@ -168,18 +190,20 @@ impl<const D: usize> Export<'_, D> {
             .map(|cell| problem.permeability.scalar(cell).expect("it is no tensor"))
             .collect();
         let data = CellData { mesh, features, frame, provenance };
-        let written = session.writing(|session| match self.format {
-            ExportFormat::Connections(files) => {
-                let flow = Flow { permeability: &k, transmissibilities: &found };
-                (dimension.files.connections_with_flow)(files, &data, flow, session)
-            }
-            ExportFormat::Disv(files) | ExportFormat::Disu(files) => {
-                let (top, thickness) = (self.request.top, self.request.thickness);
-                let rock = Rock { permeability: &k, multipliers, top, thickness };
-                (dimension.files.modflow)(files, &data, &rock, session)
-            }
-        });
-        written.map_err(|e| JobError::from(e).about(&self.request.output))?;
+        session.write_together(|group, session| {
+            let written = match self.format.staged(group)? {
+                ExportFormat::Connections(files) => {
+                    let flow = Flow { permeability: &k, transmissibilities: &found };
+                    (dimension.files.connections_with_flow)(&files, &data, flow, session)
+                }
+                ExportFormat::Disv(files) | ExportFormat::Disu(files) => {
+                    let (top, thickness) = (self.request.top, self.request.thickness);
+                    let rock = Rock { permeability: &k, multipliers, top, thickness };
+                    (dimension.files.modflow)(&files, &data, &rock, session)
+                }
+            };
+            written.map_err(|e| JobError::from(e).about(&self.request.output))
+        })?;
         let open = found.iter().copied().filter(|t| *t > 0.0);
         let (least, greatest) =
             open.fold((f64::INFINITY, 0.0_f64), |(l, m), t| (l.min(t), m.max(t)));

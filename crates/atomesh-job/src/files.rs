@@ -1,5 +1,10 @@
 //! Files to write: refused before the work if they cannot be written, and whole or absent after it.
+//!
+//! `-` and `/dev/stdout` are standard output, and so is `-.EXT`, whose extension tells the format; a file of such
+//! a name is written as `./-.EXT`.
 
+use std::ffi::OsStr;
+use std::fmt;
 use std::io::{self, Write};
 use std::path::{Path, PathBuf};
 
@@ -7,16 +12,90 @@ use atomesh_draw::{Picture, PictureFormat};
 use atomesh_io::atomic_file::AtomicFile;
 use atomesh_io::image::ImageFormat;
 use atomesh_io::mesh::MeshFormat;
+use atomesh_io::output_group::{OutputGroup, PlacingError};
+use atomesh_io::place::Place;
 use atomesh_io::surface::SurfaceFormat;
 
 use crate::error::JobError;
 use crate::session::Session;
 
+/// The names of standard output.
+const STANDARD_OUTPUT: [&str; 4] = ["-", "/dev/stdout", "/dev/fd/1", "/proc/self/fd/1"];
+
+/// Whether a name is that of standard output.
+pub fn is_standard_output(path: &Path) -> bool {
+    let name = path.as_os_str().as_encoded_bytes();
+    let has_format = name.starts_with(b"-.") && !name.contains(&b'/');
+    has_format || STANDARD_OUTPUT.iter().any(|known| path.as_os_str() == *known)
+}
+
+/// A name as messages show it.
+pub fn shown(path: &Path) -> impl fmt::Display {
+    match is_standard_output(path) {
+        true => "standard output".to_string(),
+        false => path.display().to_string(),
+    }
+}
+
+/// The name of standard output in a format, if the path is standard output; `format` is an extension such as
+/// `vtu` or `nii.gz`. Other paths come back as they are.
+///
+/// # Errors
+/// [`JobError`] if standard output has no format, or another file one.
+pub fn with_format(path: &Path, format: Option<&str>) -> Result<PathBuf, JobError> {
+    let is_plain = STANDARD_OUTPUT.iter().any(|known| path.as_os_str() == *known);
+    match format {
+        Some(format) if format.eq_ignore_ascii_case("polyMesh") => {
+            refuse_standard_output(Path::new("-"), "a polyMesh is a folder")?;
+            Ok(path.into())
+        }
+        Some(format) if is_plain => Ok(format!("-.{}", format.trim_start_matches('.')).into()),
+        Some(format) => {
+            let message = format!("--format {format} is for standard output, -o -; expected none");
+            Err(JobError::misuse(message).advise("the name of a file tells its format").about(path))
+        }
+        None if is_plain => {
+            let message = "standard output has no name that tells its format";
+            Err(JobError::misuse(message)
+                .advise("give it by --format EXT, as in -o - --format vtu"))
+        }
+        None => Ok(path.into()),
+    }
+}
+
+/// Refuses standard output for what is written as a folder or as several files.
+///
+/// # Errors
+/// [`JobError`] says what it is.
+pub(crate) fn refuse_standard_output(path: &Path, what: &str) -> Result<(), JobError> {
+    match is_standard_output(path) {
+        true => {
+            let message = format!("standard output takes one file, and {what}; expected a name");
+            Err(JobError::misuse(message))
+        }
+        false => Ok(()),
+    }
+}
+
+/// Refuses the name of a head that JSON cannot hold, since it names the tables beside it.
+///
+/// # Errors
+/// [`JobError`] names the file.
+pub(crate) fn check_head(path: &Path) -> Result<(), JobError> {
+    match path.file_name().is_none_or(|name| name.to_str().is_some()) {
+        true => Ok(()),
+        false => {
+            let message = "the name is not UTF-8, and the file names the tables beside it in JSON";
+            Err(JobError::misuse(message).advise("choose another name").about(path))
+        }
+    }
+}
+
 /// Tries whether files can be written, and would not take the place of each other or of an input.
 ///
 /// # Errors
 /// [`JobError`] names the first file that cannot be written or is taken.
-pub(crate) fn check_apart<'a>(
+pub fn check_apart<'a>(
     inputs: impl IntoIterator<Item = &'a Path>,
     outputs: impl IntoIterator<Item = &'a Path>,
     session: &mut Session<'_>,
@@ -25,8 +104,7 @@ pub(crate) fn check_apart<'a>(
     let mut taken: Vec<PathBuf> = inputs.collect();
     session.writing(|_| {
         for path in outputs {
-            check_writable(path)?;
-            let place = absolute(path);
+            let Some(place) = check_writable(path)? else { continue };
             if taken.contains(&place) {
                 let message = "would be written over another file of this run";
                 return Err(JobError::misuse(message).about(path));
@@ -37,24 +115,59 @@ pub(crate) fn check_apart<'a>(
     })
 }
 
-/// Tries whether files can be written.
-///
-/// # Errors
-/// [`JobError`] names the first that cannot.
-pub fn check<'a>(
-    outputs: impl IntoIterator<Item = &'a Path>,
-    session: &mut Session<'_>,
-) -> Result<(), JobError> {
-    session.writing(|_| outputs.into_iter().try_for_each(check_writable))
+/// Tries whether a file, or a folder if the name calls for one, can be written; gives the place that it would take.
+/// Devices take any number of outputs.
+fn check_writable(path: &Path) -> Result<Option<PathBuf>, JobError> {
+    if is_standard_output(path) {
+        return Ok(Some(STANDARD_OUTPUT[0].into()));
+    }
+    let tried = match MeshFormat::of(path) {
+        Ok(format @ MeshFormat::OpenFoam) => {
+            format.check_writable(path).map(|()| Some(absolute(path)))
+        }
+        _ => Place::of(path).and_then(|place| match place {
+            Place::File(_) => AtomicFile::create(path).map(|_| Some(absolute(path))),
+            // to open a pipe would wait for its reader, and to close it would end what it reads
+            Place::Stream(_) => Ok(None),
+        }),
+    };
+    tried.map_err(|e| JobError::unwritable(&e).about(path))
 }
 
-/// Tries whether a file, or a folder if the name calls for one, can be written.
-fn check_writable(path: &Path) -> Result<(), JobError> {
-    let tried = match MeshFormat::of(path) {
-        Ok(format) => format.check_writable(path),
-        Err(_) => AtomicFile::create(path).map(drop),
+/// The path to write an output to, until it takes its place with the others of its group.
+///
+/// # Errors
+/// [`JobError`] names the output.
+pub fn stage(path: &Path, group: &mut OutputGroup) -> Result<PathBuf, JobError> {
+    let staged = if is_standard_output(path) {
+        let name = path.to_str().and_then(|path| path.strip_prefix("-."));
+        let name = name.map_or("stdout".into(), |extension| format!("stdout.{extension}"));
+        group.stage_standard_output(path, OsStr::new(&name))
+    } else if let Ok(MeshFormat::OpenFoam) = MeshFormat::of(path) {
+        group.stage_folder(path)
+    } else {
+        group.stage(path)
     };
-    tried.map_err(|e| cannot_write(path, &e))
+    staged.map_err(|e| JobError::unwritable(&e).about(path))
+}
+
+/// [`stage`], where there is an output.
+pub(crate) fn stage_any(
+    path: &Option<PathBuf>,
+    group: &mut OutputGroup,
+) -> Result<Option<PathBuf>, JobError> {
+    path.as_deref().map(|path| stage(path, group)).transpose()
+}
+
+/// The refusal of outputs that could not take their places.
+pub(crate) fn unplaced(error: PlacingError) -> JobError {
+    let PlacingError { path, error, replaced } = error;
+    let refusal = JobError::unwritable(&error).about(&path);
+    if replaced.is_empty() {
+        return refusal;
+    }
+    let replaced: Vec<_> = replaced.iter().map(|path| path.display().to_string()).collect();
+    refusal.advise(format!("these are new already: {}", replaced.join(", ")))
 }
 
 /// Writes a file, whole or not at all.
@@ -67,15 +180,7 @@ pub fn write_bytes(path: &Path, bytes: &[u8]) -> Result<(), JobError> {
         file.write_all(bytes)?;
         file.commit()
     };
-    write().map_err(|e| cannot_write(path, &e))
-}
-
-fn cannot_write(path: &Path, error: &io::Error) -> JobError {
-    let refusal = JobError::file(format!("cannot be written: {error}")).about(path);
-    match error.kind() {
-        io::ErrorKind::NotFound => refusal.advise("make its folder first"),
-        _ => refusal,
-    }
+    write().map_err(|e: io::Error| JobError::unwritable(&e).about(path))
 }
 
 /// The path as other spellings of it would be too.
@@ -93,6 +198,10 @@ fn absolute(path: &Path) -> PathBuf {
 
 /// An error that names the file extensions that are known.
 pub fn unknown_extension(path: &Path, known: &str) -> JobError {
+    if is_standard_output(path) && path.extension().is_none() {
+        let message = format!("standard output has no extension; expected a file, one of {known}");
+        return JobError::misuse(message);
+    }
     JobError::misuse(format!("unknown file extension; expected one of {known}")).about(path)
 }
 
@@ -150,11 +259,60 @@ impl PictureFile {
         Ok(Some(Self { path: path.clone(), format }))
     }
 
+    /// The same, written to where the group says.
+    ///
+    /// # Errors
+    /// [`JobError`] names the picture.
+    pub fn staged(&self, group: &mut OutputGroup) -> Result<Self, JobError> {
+        Ok(Self { path: stage(&self.path, group)?, format: self.format })
+    }
+
     /// Writes the picture.
     ///
     /// # Errors
     /// [`JobError`] if it cannot be encoded or written.
     pub fn write(&self, picture: &Picture) -> Result<(), JobError> {
         write_bytes(&self.path, &picture.encode(self.format).map_err(JobError::content)?)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn standard_output_has_a_format_by_option_or_by_name() {
+        let named = |path: &str, format| with_format(Path::new(path), format);
+        assert_eq!(named("-", Some("vtu")), Ok("-.vtu".into()));
+        assert_eq!(named("/dev/stdout", Some(".nii.gz")), Ok("-.nii.gz".into()));
+        assert_eq!(named("m.vtu", None), Ok("m.vtu".into()));
+        assert_eq!(named("-.vtu", None), Ok("-.vtu".into()));
+        assert!(named("-", Some("polyMesh")).unwrap_err().to_string().contains("a folder"));
+        assert!(named("-", None).unwrap_err().advice().unwrap().contains("--format"));
+        assert!(named("m.vtu", Some("vtu")).unwrap_err().to_string().contains("-o -"));
+        for (name, is_it) in [("-", true), ("-.png", true), ("./-.png", false), ("-x.png", false)] {
+            assert_eq!(is_standard_output(Path::new(name)), is_it, "{name}");
+        }
+        let refused = refuse_standard_output(Path::new("-.json"), "a list is four files");
+        assert!(refused.unwrap_err().to_string().contains("a list is four files"));
+    }
+
+    #[test]
+    fn outputs_that_would_take_the_same_place_are_refused() {
+        let folder = tempfile::tempdir().unwrap();
+        let path = |name: &str| folder.path().join(name);
+        std::fs::write(path("a"), "").unwrap();
+        let mut watch = atomesh::watch::Silent;
+        let mut session = Session::new(&mut watch);
+        let mut check = |input: &str, outputs: [&Path; 2]| {
+            check_apart([path(input).as_path()], outputs, &mut session)
+        };
+        assert_eq!(check("a", [&path("b"), &path("c")]), Ok(()));
+        let again = folder.path().join("./b");
+        assert_eq!(check("a", [&path("b"), &again]).unwrap_err().path(), Some(again.as_path()));
+        assert!(check("a", [&path("b"), &path("a")]).is_err());
+        assert!(check("a", [Path::new("-"), Path::new("-.vtu")]).is_err());
+        #[cfg(unix)]
+        assert_eq!(check("a", [Path::new("/dev/null"), Path::new("/dev/null")]), Ok(()));
     }
 }

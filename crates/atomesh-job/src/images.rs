@@ -57,8 +57,7 @@ pub fn read(
 ) -> Result<AnyImage, JobError> {
     let loaded = load(path, options, session)?;
     for note in &loaded.notes {
-        let (is_warning, file) = (note.is_warning(), Some(path.into()));
-        session.note(Note { is_warning, file, text: note.to_string() });
+        session.note(Note { kind: note.into(), file: Some(path.into()), text: note.to_string() });
     }
     Ok(loaded.image)
 }

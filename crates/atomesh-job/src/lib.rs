@@ -70,4 +70,4 @@ pub mod values;
 
 pub use dimension::Dimension;
 pub use error::{ErrorKind, JobError};
-pub use session::{Listener, Note, Session};
+pub use session::{Listener, Note, NoteKind, Session};

@@ -9,6 +9,8 @@ use atomesh::mesh::Mesh;
 use atomesh::run::MeshReport;
 use atomesh_draw::Style;
 use atomesh_io::mesh::{AnyMesh, LoadedMesh};
+use serde::Serialize;
+use serde_json::Value;
 
 use crate::dimension::Dimension;
 use crate::error::JobError;
@@ -58,6 +60,26 @@ pub struct MeasureRequest {
     /// Frame.
     #[cfg_attr(feature = "clap", command(flatten, next_help_heading = "Frame"))]
     pub frame: FrameOptions,
+}
+
+impl MeasureRequest {
+    /// The files that are read.
+    fn inputs(&self) -> impl Iterator<Item = &Path> {
+        let always = [&self.mesh, &self.potential].into_iter();
+        always.chain(&self.image).chain(&self.labels).map(PathBuf::as_path)
+    }
+}
+
+/// The report as JSON, with the notes of the session.
+fn report_text(report: &MeshReport, session: &Session<'_>) -> Result<String, JobError> {
+    #[derive(Serialize)]
+    struct Noted<'a> {
+        #[serde(flatten)]
+        report: &'a MeshReport,
+        notes: Value,
+    }
+    let noted = Noted { report, notes: session.notes_json() };
+    Ok(serde_json::to_string_pretty(&noted).map_err(JobError::content)? + "\n")
 }
 
 /// What a mesh is measured against: images in place.
@@ -134,16 +156,11 @@ pub fn measure_file(
     session: &mut Session<'_>,
 ) -> Result<MeshReport, JobError> {
     let outputs = request.json.iter().chain(&request.html);
-    files::check(outputs.map(PathBuf::as_path), session)?;
-    let report = match mesh_file::read(&request.mesh)? {
-        AnyMesh::Flat(mesh) => run(request, &mesh, &Dimension::plane(), session)?,
-        AnyMesh::Volume(mesh) => run(request, &mesh, &Dimension::space(), session)?,
-    };
-    if let Some(path) = &request.json {
-        let text = serde_json::to_string_pretty(&report).map_err(JobError::content)? + "\n";
-        session.writing(|_| write_bytes(path, text.as_bytes()))?;
+    files::check_apart(request.inputs(), outputs.map(PathBuf::as_path), session)?;
+    match mesh_file::read(&request.mesh)? {
+        AnyMesh::Flat(mesh) => run(request, &mesh, &Dimension::plane(), session),
+        AnyMesh::Volume(mesh) => run(request, &mesh, &Dimension::space(), session),
     }
-    Ok(report)
 }
 
 fn run<const D: usize>(
@@ -161,10 +178,16 @@ fn run<const D: usize>(
     let against = Against::potential(potential).map_err(|e| e.about(&request.potential))?;
     let against = Against { image, labels, ..against };
     let report = measure(request, loaded, &against, dimension, session)?;
-    if let Some(path) = &request.html {
-        let page = Page { request, loaded, against: &against };
-        session.writing(|_| page.write(path, &report, dimension))?;
-    }
+    session.write_together(|group, session| {
+        if let Some(path) = files::stage_any(&request.json, group)? {
+            write_bytes(&path, report_text(&report, session)?.as_bytes())?;
+        }
+        if let Some(path) = files::stage_any(&request.html, group)? {
+            let page = Page { request, loaded, against: &against, notes: session.notes_in_words() };
+            page.write(&path, &report, dimension)?;
+        }
+        Ok(())
+    })?;
     Ok(report)
 }
 
@@ -173,6 +196,7 @@ struct Page<'a, const D: usize> {
     request: &'a MeasureRequest,
     loaded: &'a LoadedMesh<D>,
     against: &'a Against<D>,
+    notes: Vec<String>,
 }
 
 impl<const D: usize> Page<'_, D> {
@@ -207,7 +231,7 @@ impl<const D: usize> Page<'_, D> {
                 "Options of the mesh".into(),
                 made.map(|p| option_rows(&p.options)).unwrap_or_default(),
             )],
-            warnings: vec![],
+            notes: self.notes.clone(),
         };
         write_page(path, parts, report, &Shown { image, mesh: &mesh, style: &style }, dimension)
     }

@@ -22,8 +22,8 @@ pub(crate) struct PageParts<'a> {
     pub caption: String,
     /// Tables of options and of the run.
     pub tables: Vec<(String, Vec<(String, String)>)>,
-    /// What was odd.
-    pub warnings: Vec<String>,
+    /// The notes, in words.
+    pub notes: Vec<String>,
 }
 
 /// A mesh in sample coordinates over an image, as a page shows it.
@@ -56,7 +56,7 @@ pub(crate) fn write_page<const D: usize>(
         report,
         pictures: vec![(parts.caption, picture.map_err(JobError::content)?)],
         tables: parts.tables,
-        warnings: parts.warnings,
+        warnings: parts.notes,
     };
     let html = page.html().map_err(JobError::content)?;
     write_bytes(path, html.as_bytes())

@@ -1,6 +1,6 @@
 //! Properties of cells from images.
 
-use std::path::PathBuf;
+use std::path::{Path, PathBuf};
 use std::str::FromStr;
 
 use atomesh::image::Image;
@@ -190,7 +190,9 @@ pub fn sample_file(
     if let Some(twice) = names().find(|name| names().filter(|other| other == name).count() > 1) {
         return Err(JobError::misuse(format!("two images are called {twice}; expected one each")));
     }
-    files::check([request.output.as_path()], session)?;
+    let inputs = request.image.iter().map(|image| image.path.as_path());
+    let inputs = inputs.chain([request.mesh.as_path()]);
+    files::check_apart(inputs, [request.output.as_path()], session)?;
     match mesh_file::read(&request.mesh)? {
         AnyMesh::Flat(mesh) => run(request, mesh, &Dimension::plane(), session),
         AnyMesh::Volume(mesh) => run(request, mesh, &Dimension::space(), session),
@@ -214,14 +216,17 @@ fn run<const D: usize>(
     let old = old.filter(|field| found.iter().all(|new| new.name != field.name));
     let mut all: Vec<Property> = old.map(|f| Property::exact(f.name, f.values)).collect();
     all.extend(found);
-    session.writing(|session| write(request, &loaded, &all, dimension, session))?;
+    session.write_together(|group, session| {
+        let path = files::stage(&request.output, group)?;
+        write(&path, &loaded, &all, dimension, session)
+    })?;
     let fields = all.into_iter().map(|property| property.name).collect();
     Ok(SampleSummary { cell_count: loaded.mesh.cell_count(), fields })
 }
 
 /// Writes the mesh with its fields.
 fn write<const D: usize>(
-    request: &SampleRequest,
+    path: &Path,
     loaded: &LoadedMesh<D>,
     properties: &[Property],
     dimension: &Dimension<D>,
@@ -240,7 +245,7 @@ fn write<const D: usize>(
     if let Some(provenance) = &loaded.provenance {
         data = data.with_provenance(provenance);
     }
-    let format = MeshFormat::of(&request.output).map_err(JobError::misuse)?;
-    (dimension.files.mesh)(&request.output, format, &data, session)
-        .map_err(|e| JobError::from(e).about(&request.output))
+    let format = MeshFormat::of(path).map_err(JobError::misuse)?;
+    let written = (dimension.files.mesh)(path, format, &data, session);
+    written.map_err(|e| JobError::from(e).about(path))
 }

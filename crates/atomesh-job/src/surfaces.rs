@@ -167,8 +167,11 @@ fn run<const D: usize>(
     format.check_dimension(D).map_err(|e| JobError::misuse(e).about(output))?;
     let groups = surfaces(request, loaded).map_err(|e| e.about(mesh))?;
     let write = dimension.files.surface;
-    let written = session.writing(|session| write(output, &loaded.mesh, &groups, None, session));
-    written.map_err(|e| JobError::from(e).about(output))?;
+    session.write_together(|group, session| {
+        let path = files::stage(output, group)?;
+        let written = write(&path, &loaded.mesh, &groups, None, session);
+        written.map_err(|e| JobError::from(e).about(output))
+    })?;
     let facets = groups.iter().map(|group| group.facets.len()).sum();
     Ok(SurfacesSummary { groups: groups.len(), facets })
 }

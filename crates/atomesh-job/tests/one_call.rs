@@ -8,7 +8,7 @@ use atomesh::watch::{Phase, Watch};
 use atomesh_job::flow::{FlowMeshCells, FlowOptions, flow};
 use atomesh_job::mesh::{MeshImages, mesh};
 use atomesh_job::options::{LatticeOptions, RunConfig};
-use atomesh_job::{Dimension, ErrorKind, Session};
+use atomesh_job::{Dimension, ErrorKind, NoteKind, Session};
 
 /// Collects phases; ends the work as soon as one of them begins.
 #[derive(Default)]
@@ -109,7 +109,7 @@ fn warnings_are_notes() {
         mesh(&run("6"), MeshImages::new(flat), &Dimension::plane(), &mut session).unwrap();
     assert!(outcome.mesh().cell_count() > 10);
     let [note] = session.notes() else { panic!("{:?}", session.notes()) };
-    assert!(note.is_warning && note.text.contains("no features"), "{note}");
+    assert!(note.kind == NoteKind::Warning && note.text.contains("no features"), "{note}");
 }
 
 /// What flows from below to above past sealed features, and the notes.

@@ -126,6 +126,15 @@ impl ReadNote {
                 | Self::Cells
         )
     }
+
+    /// Whether it only tells what was read: nothing was guessed, filled, left out or changed.
+    pub fn is_remark(&self) -> bool {
+        match self {
+            Self::Traces { .. } | Self::Line { .. } | Self::Turned { .. } | Self::Cells => true,
+            Self::Vertical { is_known, .. } | Self::Axes { is_known, .. } => *is_known,
+            _ => false,
+        }
+    }
 }
 
 impl fmt::Display for ReadNote {

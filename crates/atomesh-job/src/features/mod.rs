@@ -243,7 +243,7 @@ fn run<const D: usize>(
     };
     let from_points = image.is_none();
     let found = features(request, loaded, image, dimension, session)?;
-    session.writing(|session| files.write(loaded, &found, dimension, session))?;
+    files.write(loaded, &found, dimension, session)?;
     let facets = found.features.iter().map(|feature| feature.facets.len()).sum();
     let (features, selection) = (found.features.len(), found.selection);
     Ok(FeaturesSummary { features, facets, selection, from_points })

@@ -6,6 +6,7 @@ use atomesh::features::FeatureSet;
 use atomesh::mesh::{Tags, is_feature_name};
 use atomesh::run::Tools;
 use atomesh_io::mesh::{LoadedMesh, MeshData, MeshFormat};
+use atomesh_io::output_group::OutputGroup;
 use atomesh_io::surface::SurfaceFormat;
 use serde_json::json;
 
@@ -15,6 +16,13 @@ use crate::error::JobError;
 use crate::files::{self, surface_format, write_bytes};
 use crate::mesh_file;
 use crate::session::Session;
+
+/// Features of a mesh, to be written.
+struct Found<'a, const D: usize> {
+    loaded: &'a LoadedMesh<D>,
+    found: &'a FeatureSet<D>,
+    dimension: &'a Dimension<D>,
+}
 
 /// The files to write, in formats that are known.
 pub(super) struct FeatureFiles<'a> {
@@ -47,7 +55,9 @@ impl<'a> FeatureFiles<'a> {
             );
             return Err(JobError::misuse(message).about(path));
         }
-        files::check(outputs.into_iter().flatten().map(|path| path.as_path()), session)?;
+        let inputs = [Some(request.mesh.as_path()), request.source()];
+        let outputs = outputs.into_iter().flatten().map(|path| path.as_path());
+        files::check_apart(inputs.into_iter().flatten(), outputs, session)?;
         Ok(Self { request, surface })
     }
 
@@ -71,25 +81,38 @@ impl<'a> FeatureFiles<'a> {
         dimension: &Dimension<D>,
         session: &mut Session<'_>,
     ) -> Result<(), JobError> {
+        session.write_together(|group, session| {
+            self.write_staged(Found { loaded, found, dimension }, group, session)
+        })
+    }
+
+    fn write_staged<const D: usize>(
+        &self,
+        Found { loaded, found, dimension }: Found<'_, D>,
+        group: &mut OutputGroup,
+        session: &mut Session<'_>,
+    ) -> Result<(), JobError> {
         let mesh = &loaded.mesh;
         if let Some((path, _)) = self.surface {
+            let path = &files::stage(path, group)?;
             let means: Vec<f32> = found.features.iter().map(|f| f.mean as f32).collect();
             let written =
                 (dimension.files.surface)(path, mesh, &found.groups(), Some(&means), session);
             written.map_err(|e| JobError::from(e).about(path))?;
         }
-        if let Some(path) = &self.request.mesh_output {
+        if let Some(path) = &files::stage_any(&self.request.mesh_output, group)? {
             let tags = self.tags(loaded, found, dimension.tools)?;
             let data = tagged(loaded, &tags);
             let format = MeshFormat::of(path).map_err(JobError::misuse)?;
             let written = (dimension.files.mesh)(path, format, &data, session);
             written.map_err(|e| JobError::from(e).about(path))?;
         }
-        if let Some(path) = &self.request.json {
+        if let Some(path) = &files::stage_any(&self.request.json, group)? {
             let report = json!({
                 "selection": found.selection,
                 "intersections": found.intersections.len(),
                 "features": found.report(mesh),
+                "notes": session.notes_json(),
             });
             write_bytes(path, format!("{report:#}\n").as_bytes())?;
         }

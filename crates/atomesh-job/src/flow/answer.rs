@@ -87,6 +87,7 @@ impl<const D: usize> FlowAnswer<D> {
             "pinned": self.solution.pinned,
             "barriers": barriers,
             "solver": self.solution.solve,
+            "notes": session.notes_json(),
             "seconds_total": session.elapsed().as_secs_f64(),
         })
     }

@@ -3,6 +3,7 @@
 use std::path::PathBuf;
 
 use atomesh_io::mesh::{FluxFiles, MeshFormat};
+use atomesh_io::output_group::OutputGroup;
 
 use super::options::FlowOutputOptions;
 use crate::error::JobError;
@@ -32,6 +33,10 @@ impl FlowFiles {
         check_extension(options.pressure_output.as_ref(), "vtu")?;
         check_extension(options.streamlines.as_ref(), "vtp")?;
         check_extension(options.fluxes.as_ref(), "json")?;
+        if let Some(path) = &options.fluxes {
+            files::refuse_standard_output(path, "a table of fluxes is two")?;
+            files::check_head(path)?;
+        }
         if let Some(path) = &options.output {
             MeshFormat::of(path).map_err(|_| unknown_extension(path, &MeshFormat::endings()))?;
         }
@@ -45,6 +50,29 @@ impl FlowFiles {
             picture: PictureFile::of(options.picture.as_ref())?,
             shows_pressure: options.picture_of == "pressure",
             shows_streamlines: options.picture_streamlines,
+        })
+    }
+
+    /// The same files, written to where the group says.
+    ///
+    /// # Errors
+    /// [`JobError`] names the file that cannot be written.
+    pub fn staged(&self, group: &mut OutputGroup) -> Result<Self, JobError> {
+        let fluxes = match &self.fluxes {
+            Some(FluxFiles { head, facets }) => Some(FluxFiles {
+                head: files::stage(head, group)?,
+                facets: files::stage(facets, group)?,
+            }),
+            None => None,
+        };
+        Ok(Self {
+            output: files::stage_any(&self.output, group)?,
+            pressure: files::stage_any(&self.pressure, group)?,
+            streamlines: files::stage_any(&self.streamlines, group)?,
+            report: files::stage_any(&self.report, group)?,
+            picture: self.picture.as_ref().map(|p| p.staged(group)).transpose()?,
+            fluxes,
+            ..*self
         })
     }
 

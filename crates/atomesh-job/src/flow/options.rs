@@ -1,6 +1,6 @@
 //! What flows where, and how that is computed.
 
-use std::path::PathBuf;
+use std::path::{Path, PathBuf};
 
 use atomesh_flow::dg::{DgOptions, Form};
 use atomesh_flow::solve::{SolveMethod, SolveOptions};
@@ -164,6 +164,15 @@ pub struct FlowOutputOptions {
     /// Draw streamlines too
     #[cfg_attr(feature = "clap", arg(long))]
     pub picture_streamlines: bool,
+}
+
+impl FlowOutputOptions {
+    /// All files that are written, without tables beside them.
+    pub fn files(&self) -> impl Iterator<Item = &Path> {
+        let Self { output, pressure_output, streamlines, fluxes, report, picture, .. } = self;
+        let all = [output, pressure_output, streamlines, fluxes, report, picture];
+        all.into_iter().flatten().map(PathBuf::as_path)
+    }
 }
 
 impl Default for FlowOutputOptions {

@@ -19,7 +19,7 @@ use super::flow_mesh::FlowMeshCells;
 use super::picture::FlowDrawing;
 use crate::dimension::Dimension;
 use crate::error::JobError;
-use crate::files::write_bytes;
+use crate::files::{PictureFile, write_bytes};
 use crate::session::Session;
 
 /// An answer to be written.
@@ -46,23 +46,26 @@ impl<'a, const D: usize> FlowWriting<'a, D> {
     pub fn write(&self, session: &mut Session<'_>) -> Result<(), JobError> {
         let needs_lines = self.files.streamlines.is_some() || self.files.shows_streamlines;
         let lines = if needs_lines { self.lines(session)? } else { Vec::new() };
-        session.writing(|session| {
-            self.draw(&lines, session)?;
+        session.write_together(|group, session| {
+            let files = self.files.staged(group)?;
+            if let Some(picture) = &files.picture {
+                self.draw(picture, &lines, session)?;
+            }
             session.begin(Phase::Write);
-            if let Some(path) = &self.files.output {
+            if let Some(path) = &files.output {
                 self.write_output(path, session)?;
             }
-            if let Some(path) = &self.files.pressure {
+            if let Some(path) = &files.pressure {
                 self.write_pressure(path, session)?;
             }
-            if let Some(path) = &self.files.streamlines {
+            if let Some(path) = &files.streamlines {
                 self.write_lines(path, &lines, session)?;
             }
-            if let Some(files) = &self.files.fluxes {
+            if let Some(files) = &files.fluxes {
                 self.write_facets(files, session)?;
             }
             session.end_phase();
-            if let Some(path) = &self.files.report {
+            if let Some(path) = &files.report {
                 let report = self.answer.report(&self.setting, &self.dimension.flow, session);
                 write_bytes(path, format!("{report:#}\n").as_bytes())?;
             }
@@ -81,8 +84,12 @@ impl<'a, const D: usize> FlowWriting<'a, D> {
         Ok(trace(grid, &self.setting, solution, &options, session)?)
     }
 
-    fn draw(&self, lines: &[Streamline<D>], session: &mut Session<'_>) -> Result<(), JobError> {
-        let Some(file) = &self.files.picture else { return Ok(()) };
+    fn draw(
+        &self,
+        file: &PictureFile,
+        lines: &[Streamline<D>],
+        session: &mut Session<'_>,
+    ) -> Result<(), JobError> {
         session.begin(Phase::Draw);
         let drawing = FlowDrawing {
             answer: self.answer,

@@ -149,6 +149,7 @@ impl Figures {
             "memory_peak_bytes": memory::peak(),
             "threads": rayon::current_num_threads(),
             "warnings": warnings,
+            "notes": session.notes_json(),
             "options": run.clone().with_defaults::<D>().in_words(),
         })
     }
@@ -186,7 +187,7 @@ impl<const D: usize> RunPage<'_, D> {
                 ("Options".into(), option_rows(&options.unwrap_or_default())),
                 ("Run".into(), effort(session)),
             ],
-            warnings: self.outcome.warnings().iter().map(ToString::to_string).collect(),
+            notes: session.notes_in_words(),
         };
         let mesh = self.outcome.sample_mesh();
         let shown = Shown { image: self.image, mesh: &mesh, style: &self.style };

@@ -11,7 +11,7 @@ use crate::error::JobError;
 use crate::images;
 use crate::memory;
 use crate::options::RunConfig;
-use crate::session::{Note, Session};
+use crate::session::{Note, NoteKind, Session};
 
 /// The images that a mesh is made from, in place: in their frame, cropped, without NaN.
 #[derive(Clone, Debug)]
@@ -105,9 +105,10 @@ impl<const D: usize> MeshImages<D> {
     }
 }
 
-/// The name of the image that gives the frame.
+/// The name of the image that gives the frame, without its folder, which reports do not hold.
 fn name(run: &RunConfig) -> String {
-    run.input.shown().map_or("the image".into(), |path| path.display().to_string())
+    let name = |path: &Path| path.file_name().unwrap_or(path.as_os_str()).display().to_string();
+    run.input.shown().map_or("the image".into(), name)
 }
 
 /// Reads the image that gives the frame.
@@ -167,8 +168,9 @@ fn read_field<const D: usize>(
         let message = format!("has {found} axes; expected {D}, as {}", name(run));
         return Err(JobError::content(message).about(path));
     };
-    let mut say = |is_warning, text: String| {
-        session.note(Note { is_warning, file: Some(path.into()), text });
+    let mut say = |is_warning: bool, text: String| {
+        let kind = if is_warning { NoteKind::Warning } else { NoteKind::Change };
+        session.note(Note { kind, file: Some(path.into()), text });
     };
     let field = onto(field, run, path, of, between, &mut say).map_err(|e| e.about(path))?;
     run.frame.place(field).map_err(|e| e.about(path))

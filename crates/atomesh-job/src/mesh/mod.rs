@@ -14,6 +14,7 @@ mod write;
 pub use figures::{Figures, Measured};
 pub(crate) use inputs::shown;
 pub use inputs::{MeshImages, read_shown};
+pub(crate) use outputs::staged_list;
 pub(crate) use refusal::refusal;
 pub use write::Tagged;
 
@@ -202,8 +203,9 @@ impl FileRun<'_> {
             _ => Measured::Nothing,
         };
         let figures = Figures::new(run, &outcome, measured, dimension.tools, session)?;
-        let writing = Writing { run, outputs, outcome: &outcome, dimension };
-        let tagged = session.writing(|session| -> Result<_, JobError> {
+        let tagged = session.write_together(|group, session| {
+            let outputs = &outputs.staged(group)?;
+            let writing = Writing { run, outputs, outcome: &outcome, dimension };
             let tagged = writing.write(image.as_ref(), session)?;
             self.write_about(&writing, image.as_ref(), &figures, session)?;
             Ok(tagged)

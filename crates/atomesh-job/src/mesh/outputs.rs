@@ -3,6 +3,7 @@
 use std::path::{Path, PathBuf};
 
 use atomesh_io::mesh::cells::ConnectionFiles;
+use atomesh_io::output_group::OutputGroup;
 
 use super::format::OutputFormat;
 use crate::error::JobError;
@@ -81,6 +82,23 @@ impl Outputs {
         })
     }
 
+    /// The same files, written to where the group says.
+    ///
+    /// # Errors
+    /// [`JobError`] names the file that cannot be written.
+    pub fn staged(&self, group: &mut OutputGroup) -> Result<Self, JobError> {
+        Ok(Self {
+            mesh: files::stage(&self.mesh, group)?,
+            connections: self.connections.as_ref().map(|f| staged_list(f, group)).transpose()?,
+            picture: self.picture.as_ref().map(|p| p.staged(group)).transpose()?,
+            report: files::stage_any(&self.report, group)?,
+            html: files::stage_any(&self.html, group)?,
+            potential: files::stage_any(&self.potential, group)?,
+            config: files::stage_any(&self.config, group)?,
+            ..*self
+        })
+    }
+
     /// Whether the image is still needed after the atoms have felt it.
     pub fn needs_image(&self) -> bool {
         self.picture.is_some() || self.needs_report()
@@ -107,6 +125,19 @@ impl Outputs {
     }
 }
 
+/// A list of connections, written to where the group says.
+pub(crate) fn staged_list(
+    files: &ConnectionFiles,
+    group: &mut OutputGroup,
+) -> Result<ConnectionFiles, JobError> {
+    Ok(ConnectionFiles {
+        head: files::stage(&files.head, group)?,
+        cells: files::stage(&files.cells, group)?,
+        connections: files::stage(&files.connections, group)?,
+        boundary: files::stage(&files.boundary, group)?,
+    })
+}
+
 fn connections(
     options: &OutputOptions,
     is_voronoi: bool,
@@ -116,6 +147,8 @@ fn connections(
         let refusal = JobError::misuse("--connections lists those of Voronoi cells");
         return Err(refusal.about(head).advise("add --mesh voronoi"));
     }
+    files::refuse_standard_output(head, "a list of connections is four")?;
+    files::check_head(head)?;
     if head.extension().is_none_or(|extension| extension != "json") {
         return Err(unknown_extension(head, ".json"));
     }

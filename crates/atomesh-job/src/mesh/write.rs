@@ -178,7 +178,7 @@ impl<const D: usize> Writing<'_, D> {
         write(path, &data, session).map_err(|e| JobError::from(e).about(path))?;
         if let Some(tables) = &outputs.connections {
             let written = (files.connections)(tables, &data, session);
-            written.map_err(|e| JobError::from(e).about(path))?;
+            written.map_err(|e| JobError::from(e).about(&tables.head))?;
         }
         Ok(())
     }
