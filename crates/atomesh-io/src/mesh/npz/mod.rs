@@ -2,6 +2,7 @@
 //! array by the name of each field at the points, `cell.NAME` for each field in the cells, and
 //! `metadata`, the frame and the provenance as JSON bytes: `json.loads(archive["metadata"].item())`.
 
+mod first_error;
 mod read;
 mod write;
 

@@ -10,6 +10,7 @@ use super::super::column::{Column, Endian};
 use super::super::data::MeshData;
 use super::super::error::MeshWriteError;
 use super::super::field::{Field, Values};
+use super::first_error::FirstError;
 
 /// Writes a mesh as NPZ; cells of second order as straight ones.
 ///
@@ -41,6 +42,17 @@ pub fn write_npz<const D: usize>(
     let bytes = Column::slice(text.as_bytes(), little);
     arrays.push(Array::new("metadata", &format!("|S{}", text.len()), &[], bytes));
 
+    let mut out = FirstError::new(out);
+    let written = write_arrays(&arrays, &mut out, watch);
+    out.result()?;
+    written
+}
+
+fn write_arrays(
+    arrays: &[Array],
+    out: impl Write + Seek,
+    watch: &mut dyn Watch,
+) -> Result<(), MeshWriteError> {
     let mut zip = ZipWriter::new(out);
     let count = arrays.len() as f64;
     for (i, array) in arrays.iter().enumerate() {
