@@ -2,8 +2,8 @@
 //!
 //! Arguments in, text out: each command takes its options from the command line, calls a job, and says what
 //! became of it. Standard output carries what was asked for; progress, notes, summaries and
-//! errors go to standard error. Exit codes: 0; 1 for content, files or memory; 2 for options; 130
-//! after Ctrl-C.
+//! errors go to standard error. Exit codes: 0; 1 for content, files or memory; 2 for options; 128 and the
+//! signal after one, which is 130 for Ctrl-C and 143 for a request to terminate.
 
 mod commands;
 mod progress;
@@ -12,11 +12,11 @@ mod words;
 use std::io::Write;
 use std::process::ExitCode;
 
-use atomesh_job::JobError;
+use atomesh_job::{ErrorKind, JobError};
 use clap::{CommandFactory, Parser, Subcommand};
 
-use progress::{Progress, Verbosity, catch_interrupts};
-use words::{exit_code, refusal};
+use progress::{Progress, Verbosity, catch_signals};
+use words::{exit_code, refusal, say};
 
 /// Meshes aligned with images.
 #[derive(Debug, Parser)]
@@ -30,6 +30,10 @@ struct Cli {
     /// Print a line for every phase, with its time
     #[arg(short, long, global = true, help_heading = "Run")]
     verbose: bool,
+    /// Write nothing, with exit code 1, if there are warnings, or notes that something was changed, guessed, filled,
+    /// left out or not met
+    #[arg(long, global = true, help_heading = "Run")]
+    strict: bool,
     /// Threads to use, 1 to 1024; the result is the same with any number. Default: one per core
     #[arg(long, global = true, value_name = "COUNT", help_heading = "Run",
         value_parser = clap::value_parser!(u16).range(1..=1024))]
@@ -53,6 +57,13 @@ enum Command {
     Man(commands::man::ManArgs),
 }
 
+impl Command {
+    /// Whether it writes what there may be notes about.
+    fn has_notes(&self) -> bool {
+        !matches!(self, Self::Info(_) | Self::Check(_) | Self::Completions(_) | Self::Man(_))
+    }
+}
+
 impl Cli {
     fn verbosity(&self) -> Verbosity {
         match (self.quiet, self.verbose) {
@@ -63,19 +74,24 @@ impl Cli {
     }
 
     fn run(self) -> Result<String, JobError> {
-        let mut watch = Progress::new(self.verbosity());
+        let mut watch = Progress::new(self.verbosity(), self.strict);
+        if self.strict && !self.command.has_notes() {
+            let message =
+                "--strict is for commands that write meshes, images or reports; expected none";
+            return Err(JobError::misuse(message));
+        }
         let result = match self.command {
             Command::Mesh(args) => commands::mesh::run(*args, &mut watch),
-            Command::Enhance(args) => commands::enhance::run(&args, &mut watch),
-            Command::Features(args) => commands::features::run(&args, &mut watch),
-            Command::Surfaces(args) => commands::surfaces::run(&args, &mut watch),
+            Command::Enhance(args) => commands::enhance::run(*args, &mut watch),
+            Command::Features(args) => commands::features::run(*args, &mut watch),
+            Command::Surfaces(args) => commands::surfaces::run(args, &mut watch),
             Command::Flow(args) => commands::flow::run(*args, &mut watch),
-            Command::Report(args) => commands::report::run(&args, &mut watch),
-            Command::Sample(args) => commands::sample::run(&args, &mut watch),
+            Command::Report(args) => commands::report::run(*args, &mut watch),
+            Command::Sample(args) => commands::sample::run(*args, &mut watch),
             Command::Export(args) => commands::export::run(&args, &mut watch),
             Command::Info(args) => commands::info::run(&args, &mut watch),
             Command::Check(args) => commands::check::run(&args),
-            Command::Synth(args) => commands::synth::run(&args, &mut watch),
+            Command::Synth(args) => commands::synth::run(args, &mut watch),
             Command::Completions(args) => Ok(commands::completions::run(&args, Cli::command())),
             Command::Man(args) => commands::man::run(&args, Cli::command()),
         };
@@ -86,17 +102,20 @@ impl Cli {
 
 fn main() -> ExitCode {
     std::panic::set_hook(Box::new(|info| {
-        eprintln!("error: {info}\nadvice: this is a bug in atomesh; please report it");
+        say(format_args!("error: {info}\nadvice: this is a bug in atomesh; please report it"));
     }));
     let cli = Cli::parse();
-    catch_interrupts();
+    catch_signals();
     let threads = cli.threads.map_or(0, usize::from);
     // 0 lets rayon choose; it fails only if it was built before
     let _ = rayon::ThreadPoolBuilder::new().num_threads(threads).build_global();
     match std::panic::catch_unwind(|| cli.run()) {
         Ok(Ok(text)) => print(&text),
         Ok(Err(error)) => {
-            eprintln!("{}", refusal(&error));
+            // who closed a pipe wants no more of it, words about it neither
+            if error.kind() != ErrorKind::ClosedPipe {
+                say(refusal(&error));
+            }
             ExitCode::from(exit_code(&error))
         }
         Err(_) => ExitCode::FAILURE,
@@ -108,7 +127,7 @@ fn print(text: &str) -> ExitCode {
     let mut out = std::io::stdout().lock();
     match out.write_all(text.as_bytes()).and_then(|()| out.flush()) {
         Err(e) if e.kind() != std::io::ErrorKind::BrokenPipe => {
-            eprintln!("error: standard output cannot be written: {e}");
+            say(format_args!("error: standard output cannot be written: {e}"));
             ExitCode::FAILURE
         }
         _ => ExitCode::SUCCESS,

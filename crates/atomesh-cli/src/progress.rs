@@ -2,18 +2,30 @@
 
 use std::io::IsTerminal;
 use std::ops::ControlFlow;
-use std::sync::atomic::{AtomicBool, Ordering};
+use std::sync::atomic::{AtomicU8, Ordering};
 use std::sync::{Mutex, MutexGuard, PoisonError};
 use std::time::{Duration, Instant};
 
 use atomesh::watch::{Phase, Watch};
+use atomesh_io::output_group::remove_unfinished;
 use atomesh_job::{JobError, Listener, Note, Session};
 use indicatif::{ProgressBar, ProgressDrawTarget, ProgressStyle};
 
-use crate::words::{exit_code, refusal};
+use crate::words::{exit_code, refusal, say};
 
-/// Whether Ctrl-C was pressed.
-static INTERRUPTED: AtomicBool = AtomicBool::new(false);
+/// The signal that asked the process to end; 0: none has.
+static SIGNAL: AtomicU8 = AtomicU8::new(0);
+
+/// The signal of Ctrl-C.
+const INTERRUPT: u8 = 2;
+
+/// The signal that asked the process to end; that of Ctrl-C before one has.
+pub fn signal() -> u8 {
+    match SIGNAL.load(Ordering::Relaxed) {
+        0 => INTERRUPT,
+        signal => signal,
+    }
+}
 
 /// Held while files are written.
 static WRITING: Mutex<()> = Mutex::new(());
@@ -21,21 +33,53 @@ static WRITING: Mutex<()> = Mutex::new(());
 /// How long the work may take to its next look.
 const PATIENCE: Duration = Duration::from_millis(500);
 
-/// Lets Ctrl-C (and a request to terminate) end the work at the next look, so that files are removed
-/// that are not finished. If that look is long in coming, as in one iteration on millions of atoms,
+/// Lets Ctrl-C, a request to terminate and the end of the terminal end the work at the next look, so that files are
+/// removed that are not finished. If that look is long in coming, as in one iteration on millions of atoms,
 /// the process ends without it, though never while files are written.
-pub fn catch_interrupts() {
-    let end = || {
-        INTERRUPTED.store(true, Ordering::Relaxed);
-        std::thread::sleep(PATIENCE);
-        let _files_are_whole = writing();
-        let clear = if std::io::stderr().is_terminal() { "\r\x1b[2K" } else { "" };
-        let error = JobError::cancelled();
-        eprintln!("{clear}{}", refusal(&error));
-        std::process::exit(exit_code(&error).into());
-    };
+#[cfg(unix)]
+pub fn catch_signals() {
+    use std::sync::Arc;
+    use std::sync::atomic::AtomicBool;
+
+    use signal_hook::consts::{SIGHUP, SIGINT, SIGTERM, SIGXFSZ};
+    // a file that grows past the system's limit is then an error of the write
+    let _ = signal_hook::flag::register(SIGXFSZ, Arc::<AtomicBool>::default());
+    // `nohup` lets the work outlive its terminal
+    let hangup = (!is_ignored(SIGHUP)).then_some(SIGHUP);
     // without a handler the system ends the process, which is no worse than failing to start
-    let _ = ctrlc::set_handler(end);
+    let Ok(mut signals) =
+        signal_hook::iterator::Signals::new([SIGINT, SIGTERM].into_iter().chain(hangup))
+    else {
+        return;
+    };
+    std::thread::spawn(move || signals.forever().next().map(|signal| end(signal as u8)));
+}
+
+/// Lets Ctrl-C end the work.
+#[cfg(not(unix))]
+pub fn catch_signals() {
+    let _ = ctrlc::set_handler(|| end(INTERRUPT));
+}
+
+/// Whether the process was started with a signal ignored, where the system says so.
+#[cfg(unix)]
+fn is_ignored(signal: i32) -> bool {
+    let status = std::fs::read_to_string("/proc/self/status").unwrap_or_default();
+    let mask = status.lines().find_map(|line| line.strip_prefix("SigIgn:"));
+    let mask = mask.and_then(|mask| u64::from_str_radix(mask.trim(), 16).ok());
+    mask.is_some_and(|mask| mask >> (signal - 1) & 1 == 1)
+}
+
+/// Ends the process after a signal.
+fn end(signal: u8) -> ! {
+    SIGNAL.store(signal, Ordering::Relaxed);
+    std::thread::sleep(PATIENCE);
+    let _files_are_whole = writing();
+    remove_unfinished();
+    let clear = if std::io::stderr().is_terminal() { "\r\x1b[2K" } else { "" };
+    let error = JobError::cancelled();
+    say(format_args!("{clear}{}", refusal(&error)));
+    std::process::exit(exit_code(&error).into());
 }
 
 /// To be held while files are written: until it is dropped, only the work itself ends the process.
@@ -65,11 +109,13 @@ pub struct Progress {
     bar: ProgressBar,
     phase: Option<(Phase, Instant)>,
     writing: Option<MutexGuard<'static, ()>>,
+    is_strict: bool,
 }
 
 impl Progress {
-    /// The bar shows if standard error is a terminal.
-    pub fn new(verbosity: Verbosity) -> Self {
+    /// The bar shows if standard error is a terminal. Where `is_strict`, jobs write files only if there is no note
+    /// but remarks.
+    pub fn new(verbosity: Verbosity, is_strict: bool) -> Self {
         let target = match verbosity {
             Verbosity::Quiet => ProgressDrawTarget::hidden(),
             _ => ProgressDrawTarget::stderr_with_hz(10),
@@ -77,7 +123,7 @@ impl Progress {
         let bar = ProgressBar::with_draw_target(Some(STEPS), target);
         let style = ProgressStyle::with_template("{prefix:>10} [{bar:30}] {percent:>3} % {msg}");
         bar.set_style(style.expect("a valid template").progress_chars("=> "));
-        Self { verbosity, bar, phase: None, writing: None }
+        Self { verbosity, bar, phase: None, writing: None, is_strict }
     }
 
     /// Whether nothing but errors is said.
@@ -94,7 +140,8 @@ impl Progress {
         job: impl FnOnce(&mut Session<'_>) -> Result<T, JobError>,
         words: impl FnOnce(&T, Duration) -> String,
     ) -> Result<T, JobError> {
-        let mut session = Session::heard_by(self);
+        let is_strict = self.is_strict;
+        let mut session = Session::heard_by(self).strict(is_strict);
         let done = job(&mut session)?;
         let elapsed = session.elapsed();
         self.finish();
@@ -127,7 +174,7 @@ impl Progress {
     /// Prints a line on standard error, unless all is to be quiet.
     fn say(&self, line: &str) {
         if !self.is_quiet() {
-            self.bar.suspend(|| eprintln!("{line}"));
+            self.bar.suspend(|| say(line));
         }
     }
 }
@@ -141,9 +188,9 @@ impl Watch for Progress {
                 self.bar.set_message(format!("energy {energy:.6e}"));
             }
         }
-        match INTERRUPTED.load(Ordering::Relaxed) {
-            true => ControlFlow::Break(()),
-            false => ControlFlow::Continue(()),
+        match SIGNAL.load(Ordering::Relaxed) {
+            0 => ControlFlow::Continue(()),
+            _ => ControlFlow::Break(()),
         }
     }
 }

@@ -14,6 +14,8 @@ use atomesh_io::image::{WriteError, WriteReason};
 use atomesh_io::mesh::MeshWriteError;
 use atomesh_io::surface::SurfaceWriteError;
 
+use crate::files::shown;
+
 /// Why a job is not done.
 #[derive(Clone, Debug, PartialEq)]
 pub struct JobError {
@@ -146,7 +148,7 @@ impl JobError {
 impl fmt::Display for JobError {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         if let Some(file) = &self.file {
-            write!(f, "{}: ", file.display())?;
+            write!(f, "{}: ", shown(file))?;
         }
         f.write_str(&self.message)
     }

@@ -2,7 +2,9 @@
 
 use atomesh_job::JobError;
 use atomesh_job::enhance::{EnhanceRequest, enhance_file};
+use atomesh_job::files::shown;
 
+use super::standard_output::StandardOutput;
 use crate::progress::Progress;
 
 /// Turn an image into the potential that attracts atoms
@@ -15,6 +17,8 @@ use crate::progress::Progress;
 pub struct EnhanceArgs {
     #[command(flatten)]
     request: EnhanceRequest,
+    #[command(flatten)]
+    standard_output: StandardOutput,
 }
 
 const EXAMPLES: &str = "\
@@ -30,8 +34,9 @@ Examples:
 ///
 /// # Errors
 /// [`JobError`] if a file cannot be used, options make no sense, or the user ends the work.
-pub fn run(args: &EnhanceArgs, progress: &mut Progress) -> Result<String, JobError> {
-    let path = args.request.output.display();
+pub fn run(mut args: EnhanceArgs, progress: &mut Progress) -> Result<String, JobError> {
+    args.standard_output.format(&mut args.request.output)?;
+    let path = shown(&args.request.output);
     progress.job(
         |session| enhance_file(&args.request, session),
         |found, _| format!("{path}: {} in {:?} samples", found.mixture, found.shape),

@@ -5,6 +5,7 @@ use std::fmt::Write;
 use atomesh_job::JobError;
 use atomesh_job::features::{FeaturesRequest, FeaturesSummary, features_file};
 
+use super::standard_output::StandardOutput;
 use crate::progress::Progress;
 
 /// Find the facets of a mesh that follow features of an image: faults, horizons, outlines
@@ -28,13 +29,16 @@ Examples:
 pub struct FeaturesArgs {
     #[command(flatten)]
     request: FeaturesRequest,
+    #[command(flatten)]
+    standard_output: StandardOutput,
 }
 
 /// Runs the command; the text is for standard output.
 ///
 /// # Errors
 /// [`JobError`] if a file cannot be used or options make no sense.
-pub fn run(args: &FeaturesArgs, progress: &mut Progress) -> Result<String, JobError> {
+pub fn run(mut args: FeaturesArgs, progress: &mut Progress) -> Result<String, JobError> {
+    args.standard_output.format_any(&mut args.request.output)?;
     let request = &args.request;
     let words = |found: &FeaturesSummary, _| summary(request, found);
     progress.job(|session| features_file(request, session), words)?;

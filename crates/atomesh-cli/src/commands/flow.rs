@@ -3,10 +3,12 @@
 use std::fmt::Write;
 
 use atomesh_job::JobError;
+use atomesh_job::files::is_standard_output;
 use atomesh_job::flow::{FlowRequest, FlowSummary, flow_file};
 
+use super::standard_output::StandardOutput;
 use crate::progress::Progress;
-use crate::words::seconds;
+use crate::words::{say, seconds};
 
 /// Compute steady flow on a mesh that follows an image, from sources to sinks, past faults
 ///
@@ -23,6 +25,8 @@ use crate::words::seconds;
 pub struct FlowArgs {
     #[command(flatten)]
     request: FlowRequest,
+    #[command(flatten)]
+    standard_output: StandardOutput,
 }
 
 const USAGE: &str = "\
@@ -46,7 +50,10 @@ Examples:
 ///
 /// # Errors
 /// [`JobError`] if options make no sense, a file cannot be used, or the user ends the work.
-pub fn run(args: FlowArgs, progress: &mut Progress) -> Result<String, JobError> {
+pub fn run(mut args: FlowArgs, progress: &mut Progress) -> Result<String, JobError> {
+    let output = &mut args.request.output;
+    args.standard_output.format_any(&mut output.output)?;
+    let holds_output = output.files().any(is_standard_output);
     let found = progress.job(
         |session| flow_file(args.request, session),
         |FlowSummary { cell_count, scheme, unknowns, method, .. }, time| {
@@ -54,7 +61,15 @@ pub fn run(args: FlowArgs, progress: &mut Progress) -> Result<String, JobError> 
             format!("{cell_count} cells; {scheme}, {unknowns} unknowns by {method}; {time}")
         },
     )?;
-    Ok(table(&found))
+    let table = table(&found);
+    if !holds_output {
+        return Ok(table);
+    }
+    // standard output holds a file: all words go elsewhere
+    if !progress.is_quiet() {
+        say(table.trim_end());
+    }
+    Ok(String::new())
 }
 
 /// The table of what flows in and out.

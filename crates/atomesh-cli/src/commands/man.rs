@@ -1,7 +1,9 @@
 //! `atomesh man`: manual pages.
 
-use std::path::PathBuf;
+use std::path::{Path, PathBuf};
+use std::{fs, io};
 
+use atomesh_io::output_group::OutputGroup;
 use atomesh_job::JobError;
 
 use crate::progress::writing;
@@ -30,7 +32,18 @@ pub fn run(args: &ManArgs, mut command: clap::Command) -> Result<String, JobErro
     let _guard = writing();
     // a page for `help` would say what `--help` says
     command = command.disable_help_subcommand(true);
-    clap_mangen::generate_to(command, folder)
-        .map_err(|e| JobError::file(format!("cannot be written: {e}")).about(folder))?;
+    write(command, folder).map_err(|e| JobError::unwritable(&e).about(folder))?;
     Ok(String::new())
+}
+
+/// Writes all pages into a folder, or none.
+fn write(command: clap::Command, folder: &Path) -> io::Result<()> {
+    if !folder.metadata()?.is_dir() {
+        return Err(io::Error::from(io::ErrorKind::NotADirectory));
+    }
+    let mut group = OutputGroup::default();
+    let staged = group.stage_folder(folder)?;
+    fs::create_dir(&staged)?;
+    clap_mangen::generate_to(command, &staged)?;
+    group.place().map_err(|e| e.error)
 }

@@ -7,10 +7,12 @@ use std::time::Duration;
 use atomesh::improve::ImproveReport;
 use atomesh::measure::ShapeReport;
 use atomesh::mesh::PolyReport;
+use atomesh_job::files::shown;
 use atomesh_job::mesh::{Expectation, MeshFileOptions, MeshSummary, expect, mesh_file};
 use atomesh_job::options::RunConfig;
-use atomesh_job::{JobError, memory};
+use atomesh_job::{JobError, Session, memory};
 
+use super::standard_output::StandardOutput;
 use crate::progress::Progress;
 use crate::words::seconds;
 
@@ -27,6 +29,8 @@ use crate::words::seconds;
 pub struct MeshArgs {
     #[command(flatten)]
     run: RunConfig,
+    #[command(flatten)]
+    standard_output: StandardOutput,
     /// Take options from a file that --write-config wrote; the command line takes precedence
     #[arg(long, value_name = "TOML", help_heading = "Run")]
     config: Option<PathBuf>,
@@ -73,8 +77,13 @@ pub fn run(args: MeshArgs, progress: &mut Progress) -> Result<String, JobError> 
     if let Some(path) = &args.config {
         run = run.or_file(path)?;
     }
+    args.standard_output.format_any(&mut run.output.output)?;
     if args.dry_run {
-        let expected = progress.job(|session| expect(run, session), |_, _| String::new())?;
+        let expecting = |session: &mut Session<'_>| {
+            let expected = expect(run, session)?;
+            session.check_notes().map(|()| expected)
+        };
+        let expected = progress.job(expecting, |_, _| String::new())?;
         return Ok(expectation(&expected));
     }
     let write_config = args.write_config.as_deref();
@@ -84,7 +93,7 @@ pub fn run(args: MeshArgs, progress: &mut Progress) -> Result<String, JobError> 
 }
 
 fn summary(made: &MeshSummary, time: Duration) -> String {
-    let path = made.mesh.display();
+    let path = shown(&made.mesh);
     let mut text = String::new();
     if let Some(tagged) = &made.tagged {
         let (features, facets) = (tagged.features, tagged.facets);

@@ -11,5 +11,6 @@ pub mod man;
 pub mod mesh;
 pub mod report;
 pub mod sample;
+pub mod standard_output;
 pub mod surfaces;
 pub mod synth;

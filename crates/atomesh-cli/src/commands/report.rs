@@ -34,11 +34,11 @@ pub struct ReportArgs {
 ///
 /// # Errors
 /// [`JobError`] if a file cannot be used or options make no sense.
-pub fn run(args: &ReportArgs, progress: &mut Progress) -> Result<String, JobError> {
-    let request = &args.request;
-    let report = progress.job(|session| measure_file(request, session), |_, _| String::new())?;
-    if request.json.is_some() || request.html.is_some() {
-        return Ok(String::new());
+pub fn run(args: ReportArgs, progress: &mut Progress) -> Result<String, JobError> {
+    let mut request = args.request;
+    if request.json.is_none() && request.html.is_none() {
+        request.json = Some("-".into());
     }
-    Ok(serde_json::to_string_pretty(&report).map_err(JobError::content)? + "\n")
+    progress.job(|session| measure_file(&request, session), |_, _| String::new())?;
+    Ok(String::new())
 }

@@ -1,8 +1,10 @@
 //! `atomesh sample`: properties of cells from images.
 
 use atomesh_job::JobError;
+use atomesh_job::files::shown;
 use atomesh_job::sample::{SampleRequest, sample_file};
 
+use super::standard_output::StandardOutput;
 use crate::progress::Progress;
 
 /// Give each cell of a mesh the mean, total or majority of an image inside it
@@ -30,14 +32,17 @@ Examples:
 pub struct SampleArgs {
     #[command(flatten)]
     request: SampleRequest,
+    #[command(flatten)]
+    standard_output: StandardOutput,
 }
 
 /// Runs the command; the text is for standard output.
 ///
 /// # Errors
 /// [`JobError`] if a file cannot be used, options make no sense, or the user ends the work.
-pub fn run(args: &SampleArgs, progress: &mut Progress) -> Result<String, JobError> {
-    let path = args.request.output.display();
+pub fn run(mut args: SampleArgs, progress: &mut Progress) -> Result<String, JobError> {
+    args.standard_output.format(&mut args.request.output)?;
+    let path = shown(&args.request.output);
     progress.job(
         |session| sample_file(&args.request, session),
         |found, _| format!("{path}: {} cells with {}", found.cell_count, found.fields.join(", ")),

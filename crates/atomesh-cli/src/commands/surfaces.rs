@@ -1,8 +1,10 @@
 //! `atomesh surfaces`: groups of facets and closed surfaces of regions, out of a mesh file.
 
 use atomesh_job::JobError;
+use atomesh_job::files::shown;
 use atomesh_job::surfaces::{SurfacesRequest, SurfacesSummary, surfaces_file};
 
+use super::standard_output::StandardOutput;
 use crate::progress::Progress;
 
 /// Write tagged facets of a mesh, or the closed surface of a region, as surfaces
@@ -21,13 +23,16 @@ Examples:
 pub struct SurfacesArgs {
     #[command(flatten)]
     request: SurfacesRequest,
+    #[command(flatten)]
+    standard_output: StandardOutput,
 }
 
 /// Runs the command; the text is for standard output.
 ///
 /// # Errors
 /// [`JobError`] if a file cannot be used, or the mesh has no such group or region.
-pub fn run(args: &SurfacesArgs, progress: &mut Progress) -> Result<String, JobError> {
+pub fn run(mut args: SurfacesArgs, progress: &mut Progress) -> Result<String, JobError> {
+    args.standard_output.format(&mut args.request.output)?;
     let request = &args.request;
     let words = |found: &SurfacesSummary, _| summary(request, found);
     progress.job(|session| surfaces_file(request, session), words)?;
@@ -37,5 +42,5 @@ pub fn run(args: &SurfacesArgs, progress: &mut Progress) -> Result<String, JobEr
 fn summary(request: &SurfacesRequest, found: &SurfacesSummary) -> String {
     let SurfacesSummary { groups, facets } = found;
     let group = if *groups == 1 { "group" } else { "groups" };
-    format!("{}: {groups} {group} of {facets} facets", request.output.display())
+    format!("{}: {groups} {group} of {facets} facets", shown(&request.output))
 }

@@ -5,12 +5,15 @@ use std::path::{Path, PathBuf};
 use atomesh::synth::{Scene, SynthError, SynthOptions, synthesize};
 use atomesh::watch::{Phase, Watch};
 use atomesh_io::image::{ImageFormat, WriteReason, write_image};
-use atomesh_job::files::{check, unknown_extension, write_bytes};
+use atomesh_job::files::{
+    check_apart, is_standard_output, shown, stage, unknown_extension, write_bytes,
+};
 use atomesh_job::options::axes;
 use atomesh_job::values::{Counts, Numbers};
 use atomesh_job::{JobError, Session, memory};
 use clap::builder::{PossibleValuesParser, TypedValueParser};
 
+use super::standard_output::StandardOutput;
 use crate::progress::Progress;
 
 /// Make a test image whose features are known
@@ -51,6 +54,8 @@ pub struct SynthArgs {
     /// Write samples as unsigned bytes, as .png always does, instead of float32
     #[arg(long)]
     bytes: bool,
+    #[command(flatten)]
+    standard_output: StandardOutput,
 }
 
 fn scene() -> impl TypedValueParser<Value = Scene> {
@@ -61,7 +66,8 @@ fn scene() -> impl TypedValueParser<Value = Scene> {
 ///
 /// # Errors
 /// [`JobError`] if an option is out of its range or a file cannot be written.
-pub fn run(args: &SynthArgs, progress: &mut Progress) -> Result<String, JobError> {
+pub fn run(mut args: SynthArgs, progress: &mut Progress) -> Result<String, JobError> {
+    args.standard_output.format(&mut args.output)?;
     let format = ImageFormat::from_path(&args.output).filter(|format| format.is_written());
     if format.is_none() {
         let known = ImageFormat::usual_written_endings(", ", false);
@@ -69,8 +75,8 @@ pub fn run(args: &SynthArgs, progress: &mut Progress) -> Result<String, JobError
     }
     let bytes = args.bytes || format == Some(ImageFormat::PNG);
     let drawn = |session: &mut Session<'_>| match args.scene.dimension() {
-        2 => draw::<2>(args, 256, bytes, session),
-        _ => draw::<3>(args, 96, bytes, session),
+        2 => draw::<2>(&args, 256, bytes, session),
+        _ => draw::<3>(&args, 96, bytes, session),
     };
     progress.job(drawn, |summary, _| summary.clone())?;
     Ok(String::new())
@@ -86,7 +92,12 @@ fn draw<const D: usize>(
     let options = options::<D>(args, side, bytes)?;
     check_memory(&options)?;
     let truth_path = truth_path(&args.output);
-    check([args.output.as_path(), truth_path.as_path()], session)?;
+    let outputs = [Some(args.output.as_path()), truth_path.as_deref()];
+    check_apart([], outputs.into_iter().flatten(), session)?;
+    if truth_path.is_none() {
+        session
+            .change("the features are not written: standard output has no place beside the image");
+    }
     let _ = session.step(Phase::Draw, 0.0, None);
     let drawn = synthesize(args.scene, &options).map_err(|e| match e {
         SynthError::Memory { .. } => JobError::memory(e),
@@ -96,19 +107,26 @@ fn draw<const D: usize>(
     if session.step(Phase::Write, 0.0, None).is_break() {
         return Err(JobError::cancelled());
     }
-    session.writing(|session| {
-        write_image(&args.output, &drawn.image, session).map_err(|e| match e.reason {
-            WriteReason::Shape { .. } => JobError::misuse(e),
+    session.write_together(|group, session| {
+        let image = stage(&args.output, group)?;
+        write_image(&image, &drawn.image, session).map_err(|e| match e.reason {
+            WriteReason::Shape { .. } => JobError::misuse(e.reason).about(&image),
             _ => e.into(),
         })?;
-        write_bytes(&truth_path, truth.as_bytes())
+        match &truth_path {
+            Some(path) => write_bytes(&stage(path, group)?, truth.as_bytes()),
+            None => Ok(()),
+        }
     })?;
+    let features = match &truth_path {
+        Some(path) => format!("features in {}", path.display()),
+        None => "features".into(),
+    };
     Ok(format!(
-        "{}: {:?} samples of {}; features in {}: {}",
-        args.output.display(),
+        "{}: {:?} samples of {}; {features}: {}",
+        shown(&args.output),
         drawn.image.frame().shape(),
         drawn.image.samples().type_name(),
-        truth_path.display(),
         drawn.truth.features.len(),
     ))
 }
@@ -154,11 +172,14 @@ fn check_memory<const D: usize>(options: &SynthOptions<D>) -> Result<(), JobErro
     Err(JobError::memory(message).advise("choose a smaller --shape"))
 }
 
-/// The image's name with another extension.
-fn truth_path(image: &Path) -> PathBuf {
+/// The image's name with another extension; standard output has none.
+fn truth_path(image: &Path) -> Option<PathBuf> {
+    if is_standard_output(image) {
+        return None;
+    }
     let compressed = image.extension().is_some_and(|e| e.eq_ignore_ascii_case("gz"));
     let image = if compressed { image.with_extension("") } else { image.to_path_buf() };
-    image.with_extension("truth.json")
+    Some(image.with_extension("truth.json"))
 }
 
 #[cfg(test)]
@@ -167,8 +188,9 @@ mod tests {
 
     #[test]
     fn the_truth_lies_beside_the_image() {
-        let of = |name: &str| truth_path(Path::new(name)).to_string_lossy().into_owned();
-        assert_eq!(of("a/faults.png"), "a/faults.truth.json");
-        assert_eq!(of("layers.nii.gz"), "layers.truth.json");
+        let of = |name: &str| truth_path(Path::new(name));
+        assert_eq!(of("a/faults.png"), Some("a/faults.truth.json".into()));
+        assert_eq!(of("layers.nii.gz"), Some("layers.truth.json".into()));
+        assert_eq!(of("-.png"), None);
     }
 }

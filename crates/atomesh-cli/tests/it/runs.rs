@@ -147,10 +147,66 @@ fn repelled_atoms_keep_off_and_the_flag_can_be_taken_back() {
     assert!(field("--config run.toml --repel=false").ends_with("to 0"));
 }
 
+/// A run that is too large for the limit on files names the output, and leaves the old one and nothing else.
+#[cfg(unix)]
+#[test]
+fn a_file_past_the_systems_limit_is_an_error_that_names_the_output() {
+    let folder = tempfile::tempdir().unwrap();
+    let folder = folder.path();
+    succeed(folder, "synth faults -o flat.png --shape 96,80 -q");
+    for name in ["m.vtu", "m.npz", "m.msh", "m.vtk", "m.inp", "b.nrrd", "h.html"] {
+        fs::write(folder.join(name), "old").unwrap();
+        let run = match name {
+            "b.nrrd" => "enhance flat.png -o b.nrrd".into(),
+            "h.html" => "mesh flat.png -o new.npz --size 40 --html h.html".into(),
+            _ => format!("mesh flat.png -o {name} --size 3"),
+        };
+        let script = format!("ulimit -f 8; exec {} -q {run}", env!("CARGO_BIN_EXE_atomesh"));
+        let output = Command::new("sh").args(["-c", &script]).current_dir(folder).output().unwrap();
+        let text = String::from_utf8_lossy(&output.stderr).into_owned();
+        assert_eq!(output.status.code(), Some(1), "{name}: {text}");
+        let expected = format!("error: {name}: cannot be written: File too large");
+        assert!(text.starts_with(&expected) && text.contains("advice: "), "{text}");
+        assert_eq!(fs::read(folder.join(name)).unwrap(), b"old");
+        fs::remove_file(folder.join(name)).unwrap();
+        assert_eq!(fs::read_dir(folder).unwrap().count(), 2, "{name}");
+    }
+}
+
+/// Words that nobody reads, and a reader of standard output that goes away, end no run in a panic.
+#[cfg(unix)]
+#[test]
+fn closed_pipes_are_quiet() {
+    use std::io::Read;
+    use std::process::Stdio;
+    let folder = tempfile::tempdir().unwrap();
+    let folder = folder.path();
+    succeed(folder, "synth faults -o flat.png --shape 96,80 -q");
+    let run = |arguments: &str| {
+        let mut command = Command::new(env!("CARGO_BIN_EXE_atomesh"));
+        command.current_dir(folder).args(arguments.split_whitespace());
+        command.stdout(Stdio::piped()).stderr(Stdio::piped()).spawn().unwrap()
+    };
+    let mut child = run("mesh flat.png -o - --format vtk --size 2 --report r.json");
+    drop(child.stdout.take());
+    let mut words = String::new();
+    child.stderr.take().unwrap().read_to_string(&mut words).unwrap();
+    assert_eq!(child.wait().unwrap().code(), Some(1), "{words}");
+    assert!(!words.contains("error") && !words.contains("panic"), "{words}");
+    assert!(!folder.join("r.json").exists());
+
+    let mut child = run("mesh flat.png -o m.npz --size 8 --verbose");
+    drop(child.stderr.take());
+    assert_eq!(child.wait().unwrap().code(), Some(0));
+    let mut child = run("mesh none.png -o m.npz --size 8");
+    drop(child.stderr.take());
+    assert_eq!(child.wait().unwrap().code(), Some(1));
+}
+
 /// The process is told to end in several phases, and does so soon, leaving no file behind.
 #[cfg(unix)]
 #[test]
-fn ctrl_c_ends_a_run_within_a_second_and_leaves_no_half_file() {
+fn signals_end_a_run_within_a_second_and_leave_no_half_file() {
     use std::process::Stdio;
     use std::time::{Duration, Instant};
 
@@ -162,7 +218,7 @@ fn ctrl_c_ends_a_run_within_a_second_and_leaves_no_half_file() {
         .map(|i| (i.wrapping_mul(0x9e37_79b9_7f4a_7c15) >> 33) as u8)
         .collect();
     fs::write(folder.join("noise.raw"), noise).unwrap();
-    for delay in [200, 1000, 3000] {
+    for (delay, signal, expected) in [(200, "INT", 130), (1000, "TERM", 143), (3000, "HUP", 129)] {
         let arguments = "mesh noise.raw -o mesh.vtu --picture mesh.png --size 3 --features edges \
              --shape 160,160,160 --dtype uint8 --write-potential b.npy --report r.json";
         let mut child = Command::new(env!("CARGO_BIN_EXE_atomesh"))
@@ -173,10 +229,12 @@ fn ctrl_c_ends_a_run_within_a_second_and_leaves_no_half_file() {
             .unwrap();
         std::thread::sleep(Duration::from_millis(delay));
         let pid = child.id().to_string();
-        assert!(Command::new("kill").args(["-INT", &pid]).status().unwrap().success());
+        assert!(
+            Command::new("kill").args([&format!("-{signal}"), &pid]).status().unwrap().success()
+        );
         let asked = Instant::now();
         let code = child.wait().unwrap().code();
-        assert_eq!(code, Some(130), "after {delay} ms");
+        assert_eq!(code, Some(expected), "after {delay} ms");
         // a second on a machine of one's own; other tests run beside this one
         assert!(
             asked.elapsed() < Duration::from_secs(2),
@@ -249,4 +307,70 @@ fn names_that_are_no_text_are_written_and_reported() {
     assert!(output.status.success(), "{}", String::from_utf8_lossy(&output.stderr));
     assert!(json(&folder.join(report))["options"].is_object());
     assert!(folder.join(page).exists());
+}
+
+/// Names with a byte that is no UTF-8, and values where only text makes sense: files are read and written under
+/// these very names, and what cannot be is refused in words.
+#[cfg(unix)]
+#[test]
+fn every_command_takes_names_that_are_no_text_or_says_why_not() {
+    use std::ffi::OsString;
+    use std::os::unix::ffi::{OsStrExt, OsStringExt};
+    // `~` in the arguments below stands for the byte
+    let name = |text: &str| {
+        let bytes = text.bytes().map(|b| if b == b'~' { 0xff } else { b });
+        OsString::from_vec(bytes.collect())
+    };
+    let folder = tempfile::tempdir().unwrap();
+    let folder = folder.path();
+    let run = |arguments: &str| {
+        let mut command = Command::new(env!("CARGO_BIN_EXE_atomesh"));
+        command.current_dir(folder).args(arguments.split_whitespace().map(name)).output().unwrap()
+    };
+    for (arguments, files) in [
+        ("synth faults -o ~.png --shape 48,40", "~.png ~.truth.json"),
+        ("info ~.png", ""),
+        ("mesh ~.png -o ~.vtu --size 6 --tag-features -0.2 --write-potential ~.npy", "~.vtu ~.npy"),
+        ("mesh ~.png -o c~.vtu --size 6 --mesh voronoi", "c~.vtu"),
+        ("mesh ~.png -o x~.vtu --size 6 --write-config ~.toml", ""),
+        ("check ~.vtu", ""),
+        ("enhance ~.png -o e~.nrrd --picture e~.png", "e~.nrrd e~.png"),
+        ("features ~.vtu ~.png -o ~.vtp --mesh-output ~.msh --json ~.json", "~.vtp ~.msh ~.json"),
+        ("surfaces ~.vtu -o ~.obj", "~.obj"),
+        (
+            "flow ~.vtu --source 8,8 --sink 40,32 --multiplier 0.1 -o f~.vtu --picture f~.png",
+            "f~.vtu f~.png",
+        ),
+        ("report ~.vtu --potential ~.npy --json r~.json --html r~.html", "r~.json r~.html"),
+        ("sample ~.vtu --image k=e~.png -o k~.vtu", ""),
+        ("export c~.vtu -o ~.disv", "~.disv ~.npf"),
+        ("export c~.vtu -o x~.json", ""),
+        ("flow ~.vtu --source 8,8 --sink 40,32 --multiplier 0.1 --fluxes x~.json", ""),
+        ("mesh ~.png -o x~.vtu --size ~", ""),
+        ("mesh ~.png -o - --format ~", ""),
+        ("mesh ~.png -o x~.xyz", ""),
+        ("completions ~", ""),
+        ("man -o none~", ""),
+        ("surfaces ~.vtu -o x~.obj --group ~", ""),
+    ] {
+        let output = run(arguments);
+        let words = String::from_utf8_lossy(&output.stderr).into_owned();
+        let is_refused = files.is_empty() && !arguments.starts_with(['i', 'c'])
+            || arguments.starts_with("completions");
+        let expected: &[i32] = if is_refused { &[1, 2] } else { &[0] };
+        let code = output.status.code().unwrap_or(-1);
+        assert!(expected.contains(&code), "{arguments}: {code} {words}");
+        assert!(!words.contains("panic") && !words.contains("bug"), "{arguments}: {words}");
+        assert!(!is_refused || words.starts_with("error: "), "{arguments}: {words}");
+        for file in files.split_whitespace() {
+            assert!(folder.join(name(file)).exists(), "{arguments}: {file}");
+        }
+    }
+    for entry in fs::read_dir(folder).unwrap() {
+        let name = entry.unwrap().file_name();
+        assert!(
+            name.as_bytes().contains(&0xff) && !name.to_string_lossy().contains("x\u{fffd}"),
+            "{name:?}"
+        );
+    }
 }

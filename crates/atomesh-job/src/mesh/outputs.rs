@@ -43,6 +43,9 @@ impl Outputs {
         let Some(mesh) = options.output.clone() else {
             return Err(JobError::misuse("no mesh to write; expected -o MESH, as in -o mesh.vtu"));
         };
+        if config.is_some() {
+            check_names(run)?;
+        }
         let is_voronoi = run.is_voronoi();
         let format = OutputFormat::of(&mesh, is_voronoi, options.msh.as_deref())?;
         let connections = connections(options, is_voronoi)?;
@@ -122,6 +125,19 @@ impl Outputs {
         let tables = self.connections.iter().flat_map(ConnectionFiles::paths);
         let all = others.chain(tables).chain(self.config.as_deref());
         files::check_apart(run.input.paths(), all, session)
+    }
+}
+
+/// Refuses names of files that a configuration, which is text, cannot hold.
+fn check_names(run: &RunConfig) -> Result<(), JobError> {
+    let RunConfig { mut input, mut output, .. } = run.clone();
+    let names = input.files_mut().into_iter().chain(output.files_mut()).flatten();
+    match names.into_iter().find(|path| path.to_str().is_none()) {
+        Some(path) => {
+            let message = "the name is not UTF-8, which --write-config cannot hold";
+            Err(JobError::misuse(message).advise("choose another name").about(path))
+        }
+        None => Ok(()),
     }
 }
 
