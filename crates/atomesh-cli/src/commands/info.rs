@@ -46,7 +46,7 @@ pub fn run(args: &InfoArgs, watch: &mut dyn Watch) -> Result<String, JobError> {
         }
         .map_err(|f| f.about(&args.file));
     }
-    let LoadedImage { image, units, notes } = images::load(&args.file, &options, watch)?;
+    let LoadedImage { image, units, notes, .. } = images::load(&args.file, &options, watch)?;
     let mut text = String::new();
     let range = image.range();
     line(&mut text, "type", image.type_name());

@@ -11,6 +11,9 @@ pub struct LoadedImage {
     pub image: AnyImage,
     /// The units of the axes x, y (and z), such as `m` or `ms`; empty if the file names none.
     pub units: Vec<String>,
+    /// A byte for each sample, in the samples' order: 1 where the file has no data (missing and dead traces),
+    /// where the sample is 0; none if all samples have data.
+    pub absent: Option<Vec<u8>>,
     /// What the user should know, in the order in which it was found.
     pub notes: Vec<ReadNote>,
 }
@@ -25,7 +28,7 @@ impl LoadedImage {
 
 impl From<AnyImage> for LoadedImage {
     fn from(image: AnyImage) -> Self {
-        Self { image, units: Vec::new(), notes: Vec::new() }
+        Self { image, units: Vec::new(), absent: None, notes: Vec::new() }
     }
 }
 
@@ -48,6 +51,20 @@ pub enum ReadNote {
         expected: usize,
         /// The number of the first.
         first: String,
+    },
+    /// Traces are marked as dead or as dummies: they are taken as missing, their samples are 0.
+    DeadTraces {
+        /// How many there are.
+        dead: usize,
+        /// The traces in the file.
+        count: usize,
+        /// The first of them, from 1.
+        first: usize,
+    },
+    /// All traces are marked as dead or as dummies; the marks are ignored.
+    AllDead {
+        /// The traces in the file.
+        count: usize,
     },
     /// No trace says where it is.
     NoCoordinates {
@@ -136,6 +153,16 @@ impl fmt::Display for ReadNote {
                 f,
                 "{missing} of {expected} traces are missing, the first of them {first}; their \
                  samples are 0"
+            ),
+            Self::DeadTraces { dead, count, first } => write!(
+                f,
+                "{dead} of {count} traces are marked as dead or dummy (identification codes 2 and 3), \
+                 the first of them trace {first}; they are taken as missing, and their samples are 0"
+            ),
+            Self::AllDead { count } => write!(
+                f,
+                "all {count} traces are marked as dead or dummy (identification codes 2 and 3); their \
+                 samples are taken as they are"
             ),
             Self::NoCoordinates { bytes } => write!(
                 f,

@@ -4,7 +4,7 @@
 //! Barry, Cavers & Kneale 1975. Order of the work: the file's header and its size give the traces'
 //! length and number; all trace headers are read, the samples skipped; their numbers arrange the
 //! traces, their coordinates place the grid; then samples are read once, in blocks, into the vector
-//! that will hold them, missing traces being 0.
+//! that will hold them; those of missing and dead traces are 0, and told from others by a mask.
 //!
 //! Axes: in a cube x runs along the crossline numbers, y along the inline numbers; on a line x runs
 //! along the line. The last axis is the sample number, downwards. World coordinates are X and Y of
@@ -29,6 +29,7 @@ use super::traces::{self, TraceLayout};
 
 mod fit;
 mod header;
+mod live;
 mod survey;
 #[cfg(test)]
 mod tests;
@@ -84,8 +85,9 @@ fn read(source: Source) -> Result<LoadedImage, ReadReason> {
     let Source { bytes: mut source, length: file_bytes, .. } = source;
     options.check()?;
     let header = Header::read(&mut source, file_bytes)?;
-    let heads = trace::read_headers(&mut source, &header, options)?;
+    let mut heads = trace::read_headers(&mut source, &header, options)?;
     let mut notes = Vec::new();
+    live::note_dead(&mut heads, &mut notes);
     let survey = Survey::arrange(&heads, options, &mut notes)?;
     let placement = fit::place(&heads, &survey, options.coordinate_bytes(), &mut notes);
     let vertical = vertical(&header, &heads, options, &mut notes);
@@ -103,25 +105,28 @@ fn read(source: Source) -> Result<LoadedImage, ReadReason> {
         Some(Vertical::Depth) => "m",
         None => "",
     };
-    let [nx, ny] = survey.shape;
+    let ([nx, ny], places) = (survey.shape, live::live_places(&heads, &survey));
+    let absent = live::absent(&places, survey.trace_places(), header.samples)?;
     // frames are made first, so that what is wrong with them is reported before the long read
     let (image, units) = if survey.is_cube {
         let frame = cube_frame([nx, ny, header.samples], placement, vertical)?;
-        let samples = read_samples(&mut source, &header, &survey)?;
+        let samples = read_samples(&mut source, &header, &places, nx * ny)?;
         (AnyImage::Volume(Image::new(frame, samples)?), vec![length, length, depth])
     } else {
         let frame = line_frame([nx, header.samples], placement, vertical)?;
-        let samples = read_samples(&mut source, &header, &survey)?;
+        let samples = read_samples(&mut source, &header, &places, nx * ny)?;
         (AnyImage::Flat(Image::new(frame, samples)?), vec![length, depth])
     };
-    Ok(LoadedImage { image, units: units.into_iter().map(String::from).collect(), notes })
+    let units = units.into_iter().map(String::from).collect();
+    Ok(LoadedImage { image, units, absent, notes })
 }
 
-/// Reads the samples of all traces to their places.
+/// Reads the samples of traces to their places in a plane of `plane` traces.
 fn read_samples<R: Read + Seek>(
     source: &mut R,
     header: &Header,
-    survey: &Survey,
+    places: &[usize],
+    plane: usize,
 ) -> Result<Samples, ReadReason> {
     source.seek(SeekFrom::Start(header.start)).map_err(ReadReason::Io)?;
     let layout = TraceLayout {
@@ -129,8 +134,8 @@ fn read_samples<R: Read + Seek>(
         byte_order: header.byte_order,
         header_bytes: header.trace_header,
         samples: header.samples,
-        places: &survey.places,
-        plane: survey.trace_places(),
+        places,
+        plane,
     };
     traces::read(source, &layout)
 }

@@ -1,9 +1,11 @@
-//! Small files of our own writing, in every revision and number that is read.
+//! Small files of our own writing, in every revision and number that is read; odd ones in [`odd`].
 
 use super::super::{ByteOrder, ReadOptions, decode_image, load_bytes};
 use super::*;
 use atomesh::watch::Silent;
 use proptest::prelude::*;
+
+mod odd;
 
 /// A file to write.
 #[derive(Clone)]

@@ -24,7 +24,12 @@ pub(super) struct Trace {
     pub units: i16,
     /// The time of the first sample in milliseconds.
     pub delay: i16,
+    /// Whether the header says that there are no data.
+    pub is_dead: bool,
 }
+
+/// The codes of trace identification for dead traces and for dummies.
+const DEAD: [i16; 2] = [2, 3];
 
 impl Trace {
     fn parse(bytes: &[u8; TRACE_HEADER], byte_order: ByteOrder, options: &SegyOptions) -> Self {
@@ -42,6 +47,7 @@ impl Trace {
             scalar: view.i16(71),
             units: view.i16(89),
             delay: view.i16(109),
+            is_dead: DEAD.contains(&view.i16(29)),
         }
     }
 

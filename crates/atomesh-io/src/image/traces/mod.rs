@@ -19,6 +19,9 @@ pub(super) use number::Number;
 /// Bytes of traces that are held at a time.
 const BLOCK: usize = 1 << 21;
 
+/// The place of a trace whose samples are left out.
+pub(super) const NOWHERE: usize = usize::MAX;
+
 /// How traces lie in a stream of bytes, one after another.
 pub(super) struct TraceLayout<'a> {
     pub number: Number,
@@ -27,7 +30,7 @@ pub(super) struct TraceLayout<'a> {
     pub header_bytes: usize,
     /// Samples of each.
     pub samples: usize,
-    /// Where each belongs in a plane of equal depth.
+    /// Where each belongs in a plane of equal depth; [`NOWHERE`] if its samples are not wanted.
     pub places: &'a [usize],
     /// The places of a plane.
     pub plane: usize,
@@ -79,6 +82,9 @@ fn spread<const N: usize, T: Copy + Default>(
         for z in 0..depth {
             let row = &mut samples[z * plane..][..plane];
             for (trace, &place) in bytes.chunks_exact(each).zip(places) {
+                if place == NOWHERE {
+                    continue;
+                }
                 let mut number = [0; N];
                 number.copy_from_slice(&trace[header_bytes + z * N..][..N]);
                 if byte_order == ByteOrder::Little {
