@@ -64,7 +64,7 @@ pub fn run(args: &InfoArgs, watch: &mut dyn Watch) -> Result<String, JobError> {
         line(&mut text, "units", named.collect::<Vec<_>>().join(","));
     }
     for note in &notes {
-        line(&mut text, if note.is_warning() { "warning" } else { "note" }, note);
+        line(&mut text, if note.is_warning() { "warning" } else { "note" }, images::words(note));
     }
     Ok(frame + &text)
 }

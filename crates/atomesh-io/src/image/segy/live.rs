@@ -1,8 +1,8 @@
 //! Which traces have data: all but those that their headers mark as dead, or as dummies that fill gaps.
 
 use super::super::error::ReadReason;
+use super::super::memory::Memory;
 use super::super::note::ReadNote;
-use super::super::stream;
 use super::super::traces::NOWHERE;
 use super::survey::Survey;
 use super::trace::Trace;
@@ -33,13 +33,14 @@ pub(super) fn absent(
     places: &[usize],
     plane: usize,
     depth: usize,
+    memory: Memory,
 ) -> Result<Option<Vec<u8>>, ReadReason> {
     let mut is_absent = vec![1; plane];
     places.iter().filter(|&&place| place != NOWHERE).for_each(|&place| is_absent[place] = 0);
     if !is_absent.contains(&1) {
         return Ok(None);
     }
-    let mut absent: Vec<u8> = stream::zeros(plane.saturating_mul(depth))?;
+    let mut absent: Vec<u8> = memory.zeros(plane.saturating_mul(depth))?;
     absent.chunks_exact_mut(plane).for_each(|samples| samples.copy_from_slice(&is_absent));
     Ok(Some(absent))
 }
