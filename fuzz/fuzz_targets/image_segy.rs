@@ -11,6 +11,7 @@ fuzz_target!(|input: (Option<[u8; 2]>, Option<[u8; 2]>, bool, &[u8])| {
         trace_bytes: traces.map(|t| t.map(usize::from)),
         coordinate_bytes: coordinates.map(|c| c.map(usize::from)),
         vertical: deep.then_some(Vertical::Depth),
+        ..SegyOptions::default()
     };
     // the textual header is skipped: without it the fuzzer reaches what matters sooner
     let mut bytes = vec![b' '; 3200];

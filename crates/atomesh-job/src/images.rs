@@ -5,7 +5,8 @@ use std::path::Path;
 use atomesh::image::{Frame, Image};
 use atomesh::watch::Watch;
 use atomesh_io::image::{
-    AnyImage, ImageFormat, LoadedImage, ReadError, ReadOptions, ReadReason, load_image,
+    AnyImage, ImageFormat, LoadedImage, ReadError, ReadNote, ReadOptions, ReadReason, SampleFormat,
+    load_image,
 };
 
 use crate::dimension::Dimension;
@@ -36,10 +37,18 @@ fn refusal(error: ReadError) -> JobError {
             .advise("rename the file, or describe raw samples by --shape and --dtype"),
         ReadReason::NoRawLayout => JobError::misuse("raw samples say neither shape nor type")
             .advise("give --shape NX,NY[,NZ] and --dtype TYPE"),
-        ReadReason::DuplicateTraces { .. } | ReadReason::SparseTraces { .. } => {
-            JobError::content(&reason)
-                .advise("--trace-bytes INLINE,XLINE says where; one byte twice makes a line")
+        ReadReason::SparseTraces { .. } | ReadReason::NoLine { .. } => JobError::content(&reason)
+            .advise("--trace-bytes INLINE,XLINE says where numbers are; one byte twice makes a line"),
+        ReadReason::DuplicateTraces { .. } => JobError::content(&reason).advise(
+            "--trace-bytes INLINE,XLINE says where, if their numbers are elsewhere; else remove one of them",
+        ),
+        ReadReason::DataOutside { .. } => JobError::content(&reason)
+            .advise("--data-root DIR allows files in DIR and below"),
+        ReadReason::Memory { .. } => {
+            JobError::memory(&reason).advise("crop or resample the image first")
         }
+        ReadReason::TraceFormat { .. } => JobError::content(&reason)
+            .advise("--sample-format says how samples are written, if the header does not"),
         ReadReason::RawSize { .. } | ReadReason::RawShape { .. } => JobError::misuse(&reason),
         _ => JobError::content(&reason),
     }
@@ -57,9 +66,25 @@ pub fn read(
 ) -> Result<AnyImage, JobError> {
     let loaded = load(path, options, session)?;
     for note in &loaded.notes {
-        session.note(Note { kind: note.into(), file: Some(path.into()), text: note.to_string() });
+        session.note(Note { kind: note.into(), file: Some(path.into()), text: words(note) });
     }
     Ok(loaded.image)
+}
+
+/// A reader's note, with the option that decides otherwise where there is one.
+pub fn words(note: &ReadNote) -> String {
+    let advice = match note {
+        ReadNote::SampleFormat { other: SampleFormat::Ibm, .. } => {
+            "--sample-format ibm reads them so"
+        }
+        ReadNote::SampleFormat { .. } => "--sample-format ieee reads them so",
+        ReadNote::IntervalsDiffer { .. } | ReadNote::NegativeInterval { .. } => {
+            "--spacing says otherwise"
+        }
+        ReadNote::TimeScalar { .. } => "--origin says otherwise",
+        _ => return note.to_string(),
+    };
+    format!("{note} ({advice})")
 }
 
 /// What an image that is read for a mesh is to the mesh.

@@ -5,14 +5,32 @@ use std::path::Path;
 
 use crate::error::JobError;
 
-/// Bytes that may still be taken: what the system has left, or the control group if that is less.
-/// `None` where the system does not say.
+/// Bytes that may still be taken: what the system has left, or the control group or the limit of the process's
+/// address space (`ulimit -v`) if that is less. `None` where the system does not say.
 pub fn available() -> Option<u64> {
     let system = kibibytes(&fs::read_to_string("/proc/meminfo").ok()?, "MemAvailable:");
     let own = fs::read_to_string("/proc/self/cgroup").unwrap_or_default();
     let path = own.lines().find_map(|line| line.strip_prefix("0::")).unwrap_or("/");
     let group = group_room(Path::new("/sys/fs/cgroup"), path);
-    [system, group].into_iter().flatten().min()
+    [system, group, address_room()].into_iter().flatten().min()
+}
+
+/// Bytes that the samples of an image may take: what is available, but for an eighth that is left to all else.
+pub(crate) fn room() -> Option<u64> {
+    available().map(|bytes| bytes / 8 * 7)
+}
+
+/// What is left of the address space that this process may have.
+fn address_room() -> Option<u64> {
+    let limit = address_limit(&fs::read_to_string("/proc/self/limits").ok()?)?;
+    let used = kibibytes(&fs::read_to_string("/proc/self/status").ok()?, "VmSize:")?;
+    Some(limit.saturating_sub(used))
+}
+
+/// The soft limit of the address space, in bytes, of a table of limits; none if there is none.
+fn address_limit(limits: &str) -> Option<u64> {
+    let line = limits.lines().find_map(|line| line.strip_prefix("Max address space"))?;
+    line.split_whitespace().next()?.parse().ok()
 }
 
 /// The most bytes that this process has held at once.
@@ -95,6 +113,20 @@ mod tests {
         assert_eq!(kibibytes(text, "MemAvailable:"), Some(65_536));
         assert_eq!(kibibytes(text, "VmHWM:"), None);
         assert_eq!(kibibytes("VmHWM: x kB", "VmHWM:"), None);
+    }
+
+    #[test]
+    fn limits_of_the_address_space_are_in_bytes_or_unlimited() {
+        let table = |soft: &str| {
+            format!(
+                "Limit                     Soft Limit           Hard Limit           Units     \n\
+                 Max locked memory         8388608              8388608              bytes     \n\
+                 Max address space         {soft:<20} unlimited            bytes     \n"
+            )
+        };
+        assert_eq!(address_limit(&table("4096000000")), Some(4_096_000_000));
+        assert_eq!(address_limit(&table("unlimited")), None);
+        assert_eq!(address_limit(""), None);
     }
 
     #[test]

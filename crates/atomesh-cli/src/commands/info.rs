@@ -46,7 +46,7 @@ pub fn run(args: &InfoArgs, watch: &mut dyn Watch) -> Result<String, JobError> {
         }
         .map_err(|f| f.about(&args.file));
     }
-    let LoadedImage { image, units, notes } = images::load(&args.file, &options, watch)?;
+    let LoadedImage { image, units, notes, .. } = images::load(&args.file, &options, watch)?;
     let mut text = String::new();
     let range = image.range();
     line(&mut text, "type", image.type_name());
@@ -64,7 +64,7 @@ pub fn run(args: &InfoArgs, watch: &mut dyn Watch) -> Result<String, JobError> {
         line(&mut text, "units", named.collect::<Vec<_>>().join(","));
     }
     for note in &notes {
-        line(&mut text, if note.is_warning() { "warning" } else { "note" }, note);
+        line(&mut text, if note.is_warning() { "warning" } else { "note" }, images::words(note));
     }
     Ok(frame + &text)
 }

@@ -5,8 +5,10 @@ use std::path::Path;
 
 use atomesh::watch::Watch;
 
+use super::detached::DataFolders;
 use super::error::{ReadReason, WriteReason};
 use super::format::ImageFormat;
+use super::memory::Memory;
 use super::note::LoadedImage;
 use super::options::ReadOptions;
 use super::view::ImageView;
@@ -86,7 +88,7 @@ pub(super) type Writer =
 pub(super) struct Folder {
     /// Whether the file at a path is one of such a folder, whatever its name is.
     pub is_part: fn(&Path) -> bool,
-    pub read: fn(&Path, &mut dyn Watch) -> Result<LoadedImage, ReadReason>,
+    pub read: fn(&Path, &ReadOptions, &mut dyn Watch) -> Result<LoadedImage, ReadReason>,
 }
 
 /// Bytes that can be read from any place.
@@ -105,7 +107,8 @@ pub(super) struct Source<'a> {
     pub bytes: Watched<'a, &'a mut dyn Input>,
     /// Their number.
     pub length: u64,
-    /// The folder in which other files of the image stand, if it is known.
-    pub folder: Option<&'a Path>,
+    /// Where other files of the image may be, if that is known.
+    pub folders: Option<DataFolders<'a>>,
+    pub memory: Memory,
     pub options: &'a ReadOptions,
 }

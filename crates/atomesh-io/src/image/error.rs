@@ -40,6 +40,23 @@ pub enum ReadReason {
         /// What the system said.
         error: io::Error,
     },
+    /// A header names a file of samples that it may not.
+    #[error(
+        "its data file {} is outside of the header's folder; expected one beside the header or below it",
+        path.display()
+    )]
+    DataOutside {
+        /// The file, as the header names it.
+        path: PathBuf,
+    },
+    /// A header names a file of samples more than once.
+    #[error("its data file {} is named {times} times; expected a file of its own for each part", path.display())]
+    DataTwice {
+        /// The file, as the header names it.
+        path: PathBuf,
+        /// How often it is named.
+        times: usize,
+    },
     /// The file's name ends like no format that is known.
     #[error(
         "no image format is known by the ending {extension:?}; known are {known}, and any file as raw \
@@ -61,7 +78,7 @@ pub enum ReadReason {
         format: ImageFormat,
     },
     /// The file does not begin as its format does.
-    #[error("begins with the bytes {found:02x?}, unlike {format}{}", hint(found, *.like))]
+    #[error("begins with {}, unlike {format}{}", beginning(found), hint(found, *.like))]
     Magic {
         /// The format that the name promises.
         format: ImageFormat,
@@ -194,6 +211,37 @@ pub enum ReadReason {
         /// Their numbers, as in `inlines 1 to 100, crosslines 1 to 100`.
         numbers: String,
     },
+    /// The grid of a seismic survey is sheared.
+    #[error(
+        "inlines and crosslines meet at {degrees:.3} degrees; expected 90, since a sheared grid has no \
+         frame: bin the traces anew, in rows and columns at right angles"
+    )]
+    ShearedTraces {
+        /// The angle between the two.
+        degrees: f64,
+    },
+    /// Traces that no inline and crossline numbers arrange are neither a grid nor a line.
+    #[error(
+        "{traces} traces have neither inline nor crossline numbers, and by X and Y they are no regular \
+         grid and no line either: steps from trace to trace are {median:.4} mostly, {longest:.4} at most"
+    )]
+    NoLine {
+        /// The traces with coordinates.
+        traces: usize,
+        /// The median of the steps from trace to trace.
+        median: f64,
+        /// The longest step.
+        longest: f64,
+    },
+    /// A SEG-Y header names no sample format that is read.
+    #[error(
+        "the sample format code (bytes 3225-3226) is {code}; expected 1 (IBM), 5, 6 (IEEE), 2, 3, 8, 10, \
+         11 or 16 (integers)"
+    )]
+    TraceFormat {
+        /// The code.
+        code: i16,
+    },
     /// A place in a trace header lies outside of it.
     #[error("byte {byte} of a trace header; expected 1 to 237, where numbers of 4 bytes can begin")]
     TraceByte {
@@ -201,10 +249,12 @@ pub enum ReadReason {
         byte: usize,
     },
     /// The samples do not fit into memory.
-    #[error("no memory for {bytes} bytes of samples; crop or resample the image")]
+    #[error("{bytes} bytes of samples do not fit into memory{}", left(*.limit))]
     Memory {
         /// The bytes asked for.
         bytes: u128,
+        /// The bytes that there are, if it is known.
+        limit: Option<u64>,
     },
     /// The header's frame is impossible.
     #[error("{0}")]
@@ -233,6 +283,17 @@ impl ReadReason {
     ) -> Self {
         Self::Decoder { format, error: error.into() }
     }
+}
+
+/// The first bytes, unless they are text: that may be anyone's.
+fn beginning(head: &[u8]) -> String {
+    let is_text = head.iter().all(|b| b.is_ascii_graphic() || b.is_ascii_whitespace());
+    if is_text { "text".into() } else { format!("the bytes {head:02x?}") }
+}
+
+/// What there is of memory.
+fn left(limit: Option<u64>) -> String {
+    limit.map_or_else(String::new, |limit| format!(", of which {limit} are left"))
 }
 
 /// What the first bytes say about a file with the wrong name.

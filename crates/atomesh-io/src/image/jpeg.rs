@@ -17,7 +17,6 @@ use super::error::ReadReason;
 use super::format::ImageFormat;
 use super::note::LoadedImage;
 use super::shape::plausible_count;
-use super::stream;
 
 const FORMAT: ImageFormat = ImageFormat::named("JPEG");
 
@@ -31,8 +30,13 @@ pub(super) const CODEC: Codec = Codec {
 /// axes may be subsampled fourfold.
 const DENSITY: u64 = 8 * 64 * 4;
 
+/// Bytes that the decoder may hold of a value: itself, and of progressive files its coefficient of two bytes.
+const BYTES_PER_VALUE: u128 = 3;
+
 /// Decodes a flat image, colour to luminance in place. The file is held whole meanwhile.
 fn read(mut source: Source) -> Result<LoadedImage, ReadReason> {
+    let memory = source.memory;
+    memory.check(source.length.into())?;
     let mut file = Vec::new();
     source.bytes.read_to_end(&mut file).map_err(ReadReason::Io)?;
     let options = DecoderOptions::default()
@@ -48,7 +52,9 @@ fn read(mut source: Source) -> Result<LoadedImage, ReadReason> {
         _ => ColorSpace::RGB,
     };
     let count = plausible_count(&[width, height], source.length, DENSITY)?;
-    let mut samples = stream::zeros(count.saturating_mul(color.num_components()))?;
+    let values = count.saturating_mul(color.num_components());
+    memory.check(values as u128 * BYTES_PER_VALUE)?;
+    let mut samples = memory.zeros(values)?;
     let options = options.jpeg_set_out_colorspace(color);
     let mut decoder = JpegDecoder::new_with_options(ZCursor::new(&file[..]), options);
     decoder.decode_into(&mut samples).map_err(|e| ReadReason::decoder(FORMAT, e))?;

@@ -44,14 +44,14 @@ fn unsupported(found: String, expected: &'static str) -> ReadReason {
 
 /// Reads a `.mha` or `.mhd` file.
 fn read(source: Source) -> Result<LoadedImage, ReadReason> {
-    let Source { bytes: source, length: file_bytes, folder, .. } = source;
+    let Source { bytes: source, length: file_bytes, folders, memory, .. } = source;
     let mut source = BufReader::with_capacity(1 << 16, source);
     let mut lines = Lines::new(&mut source);
     let entries = Entries::read(&mut lines)?;
     let rest = file_bytes.saturating_sub(lines.bytes);
     let payload = entries.payload()?;
     let affine = entries.affine(payload.shape.len())?;
-    let read = || payload.read(source, rest, folder);
+    let read = || payload.read(source, rest, folders, memory);
     let image = affine::image(FORMAT, &payload.shape, affine, read)?;
     Ok(LoadedImage::from(image).noting(entries.world().note()))
 }
@@ -65,12 +65,15 @@ struct Entries {
 impl Entries {
     fn read(lines: &mut Lines) -> Result<Self, ReadReason> {
         let mut entries = Vec::new();
+        let mut number = 0;
         while let Some(line) = lines.next()? {
+            number += 1;
             if line.trim().is_empty() {
                 continue;
             }
-            let (name, value) =
-                line.split_once('=').ok_or_else(|| wrong("line", &line, "\"Name = value\""))?;
+            // any text may be taken for a header: its lines are not told
+            let wrong_line = || wrong("a line", &format!("number {number}"), "\"Name = value\"");
+            let (name, value) = line.split_once('=').ok_or_else(wrong_line)?;
             let (name, value) = (name.trim().to_owned(), value.trim().to_owned());
             let is_last = name == LAST;
             let is_list = is_last && value.split_whitespace().next() == Some("LIST");

@@ -53,10 +53,12 @@ mod affine;
 mod any_image;
 mod codec;
 mod colour;
+mod detached;
 mod dicom;
 mod error;
 mod format;
 mod jpeg;
+mod memory;
 mod metaimage;
 mod nifti;
 mod note;
@@ -84,13 +86,16 @@ mod watched;
 
 pub use any_image::AnyImage;
 use codec::{Input, Source};
+use detached::DataFolders;
 pub use error::{ReadError, ReadReason, WriteError, WriteReason};
 pub use format::ImageFormat;
-pub use note::{LoadedImage, ReadNote};
+use memory::Memory;
+pub use note::{IntervalSource, LoadedImage, ReadNote};
 pub use options::{RawLayout, ReadOptions, SegyOptions, Vertical};
 pub use sample_type::{ByteOrder, SampleType, UnknownByteOrder, UnknownSampleType};
 pub use series_error::SeriesError;
 use table::extension;
+pub use traces::SampleFormat;
 use view::ImageView;
 use watched::Watched;
 
@@ -148,11 +153,13 @@ fn load(
     let metadata = file.metadata().map_err(ReadReason::Io)?;
     if metadata.is_dir() {
         return match &format.codec().folder {
-            Some(folder) => (folder.read)(path, watch),
+            Some(folder) => (folder.read)(path, options, watch),
             None => Err(ReadReason::Io(std::io::ErrorKind::IsADirectory.into())),
         };
     }
-    let file = Stored { bytes: &mut file, length: metadata.len(), folder: path.parent() };
+    let root = options.data_root.as_deref();
+    let folders = path.parent().map(|own| DataFolders { own, root });
+    let file = Stored { bytes: &mut file, length: metadata.len(), folders };
     decode(file, format, options, watch)
 }
 
@@ -176,15 +183,15 @@ fn load_bytes(
     watch: &mut dyn Watch,
 ) -> Result<LoadedImage, ReadReason> {
     let mut cursor = Cursor::new(bytes);
-    let stored = Stored { bytes: &mut cursor, length: bytes.len() as u64, folder: None };
+    let stored = Stored { bytes: &mut cursor, length: bytes.len() as u64, folders: None };
     decode(stored, format, options, watch)
 }
 
-/// The bytes of a file, their number, and the folder that the file stands in, if it is known.
+/// The bytes of a file, their number, and where the files that it names may be, if that is known.
 struct Stored<'a> {
     bytes: &'a mut dyn Input,
     length: u64,
-    folder: Option<&'a Path>,
+    folders: Option<DataFolders<'a>>,
 }
 
 fn decode(
@@ -193,7 +200,7 @@ fn decode(
     options: &ReadOptions,
     watch: &mut dyn Watch,
 ) -> Result<LoadedImage, ReadReason> {
-    let Stored { bytes, length, folder } = stored;
+    let Stored { bytes, length, folders } = stored;
     if length == 0 {
         return Err(ReadReason::Empty { format });
     }
@@ -208,7 +215,8 @@ fn decode(
     let cancelled = Cell::new(false);
     let bytes: &mut dyn Input = bytes; // no longer than the watch
     let bytes = Watched::new(bytes, length, watch, &cancelled);
-    let loaded = (codec.read)(Source { bytes, length, folder, options });
+    let memory = Memory::up_to(options.memory_limit);
+    let loaded = (codec.read)(Source { bytes, length, folders, memory, options });
     if cancelled.get() { Err(Cancelled.into()) } else { loaded }
 }
 

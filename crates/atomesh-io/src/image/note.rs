@@ -1,8 +1,10 @@
 //! What a reader reports about an image besides the image itself.
 
 use std::fmt;
+use std::path::PathBuf;
 
 use super::any_image::AnyImage;
+use super::traces::SampleFormat;
 
 /// An image, and what its file says or leaves open about it.
 #[derive(Clone, Debug)]
@@ -11,6 +13,9 @@ pub struct LoadedImage {
     pub image: AnyImage,
     /// The units of the axes x, y (and z), such as `m` or `ms`; empty if the file names none.
     pub units: Vec<String>,
+    /// A byte for each sample, in the samples' order: 1 where the file has no data (missing and dead traces),
+    /// where the sample is 0; none if all samples have data.
+    pub absent: Option<Vec<u8>>,
     /// What the user should know, in the order in which it was found.
     pub notes: Vec<ReadNote>,
 }
@@ -25,7 +30,7 @@ impl LoadedImage {
 
 impl From<AnyImage> for LoadedImage {
     fn from(image: AnyImage) -> Self {
-        Self { image, units: Vec::new(), notes: Vec::new() }
+        Self { image, units: Vec::new(), absent: None, notes: Vec::new() }
     }
 }
 
@@ -48,6 +53,27 @@ pub enum ReadNote {
         expected: usize,
         /// The number of the first.
         first: String,
+    },
+    /// Traces are marked as dead or as dummies: they are taken as missing, their samples are 0.
+    DeadTraces {
+        /// How many there are.
+        dead: usize,
+        /// The traces in the file.
+        count: usize,
+        /// The first of them, from 1.
+        first: usize,
+    },
+    /// All traces are marked as dead or as dummies; the marks are ignored.
+    AllDead {
+        /// The traces in the file.
+        count: usize,
+    },
+    /// Traces without inline and crossline numbers are arranged by their coordinates.
+    TracesByPosition {
+        /// The traces in the file.
+        count: usize,
+        /// Places along x and y.
+        shape: [usize; 2],
     },
     /// No trace says where it is.
     NoCoordinates {
@@ -75,6 +101,68 @@ pub enum ReadNote {
         /// The world coordinates of the last trace.
         last: [f64; 2],
     },
+    /// A line that bends, or whose traces stand unevenly; x is the distance along it, by the mean step.
+    CrookedLine {
+        /// The world coordinates of the first trace.
+        first: [f64; 2],
+        /// The world coordinates of the last trace.
+        last: [f64; 2],
+        /// The sum of the steps from trace to trace.
+        length: f64,
+    },
+    /// Traces of a line stand unevenly; x has them at even steps.
+    UnevenLine {
+        /// The number of the trace that is farthest off, from 1.
+        trace: usize,
+        /// How far it is off along the line, in world units.
+        distance: f64,
+        /// How far it may be.
+        tolerance: f64,
+    },
+    /// A header states a sample interval that is not above 0.
+    NegativeInterval {
+        /// Where it stands.
+        of: IntervalSource,
+        /// The interval.
+        stated: f64,
+        /// Where the interval that is taken stands.
+        source: IntervalSource,
+        /// The interval that is taken.
+        taken: f64,
+    },
+    /// Trace headers state another sample interval than the one that is taken.
+    IntervalsDiffer {
+        /// Where the interval that is taken stands.
+        source: IntervalSource,
+        /// That interval.
+        taken: f64,
+        /// The first trace with another one, from 1.
+        trace: usize,
+        /// That trace's.
+        other: f64,
+        /// How many traces have another one.
+        count: usize,
+    },
+    /// Samples seem to be of another kind than the header's format code says.
+    SampleFormat {
+        /// What the header says, which is taken.
+        stated: SampleFormat,
+        /// The least and the greatest size of samples so, zeros left out, of some traces.
+        range: [f64; 2],
+        /// What they seem to be.
+        other: SampleFormat,
+        /// The least and the greatest size so.
+        other_range: [f64; 2],
+        /// Whether their bits tell; else nothing but their size speaks against what the header says.
+        is_told: bool,
+    },
+    /// The scalar of a trace's times is none of the standard's; times are taken as stored.
+    TimeScalar {
+        /// The trace, from 1.
+        trace: usize,
+        /// Its scalar.
+        scalar: i16,
+    },
     /// The spacing along the vertical axis, which means time or depth.
     Vertical {
         /// The sample interval in the header.
@@ -91,11 +179,16 @@ pub enum ReadNote {
     /// Traces begin at different times; all are taken to begin at the first one's.
     Delays {
         /// The first trace's delay in milliseconds.
-        first: i16,
+        first: f64,
         /// A trace that has another one, from 1.
         trace: usize,
         /// That trace's delay.
-        other: i16,
+        other: f64,
+    },
+    /// The file of samples that a header names is read from beside the header.
+    DataBeside {
+        /// The file, as the header names it.
+        named: PathBuf,
     },
     /// Which axis of an array became which of ours.
     Axes {
@@ -113,14 +206,45 @@ pub enum ReadNote {
     Cells,
 }
 
+/// Where a sample interval stands.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum IntervalSource {
+    /// The header of the file.
+    BinaryHeader,
+    /// The header of the first trace.
+    FirstTrace,
+}
+
+impl IntervalSource {
+    /// Why it is taken.
+    fn reason(self) -> &'static str {
+        match self {
+            Self::BinaryHeader => "it is that of the whole file",
+            Self::FirstTrace => "the binary header has none",
+        }
+    }
+}
+
+impl fmt::Display for IntervalSource {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        f.write_str(match self {
+            Self::BinaryHeader => "the binary header",
+            Self::FirstTrace => "the first trace",
+        })
+    }
+}
+
 impl ReadNote {
     /// Whether the image may be other than the user thinks: a warning, not a remark.
     pub fn is_warning(&self) -> bool {
         !matches!(
             self,
             Self::Traces { .. }
+                | Self::TracesByPosition { .. }
                 | Self::Line { .. }
+                | Self::CrookedLine { .. }
                 | Self::Vertical { .. }
+                | Self::DataBeside { .. }
                 | Self::Axes { .. }
                 | Self::Turned { .. }
                 | Self::Cells
@@ -146,6 +270,21 @@ impl fmt::Display for ReadNote {
                 "{missing} of {expected} traces are missing, the first of them {first}; their \
                  samples are 0"
             ),
+            Self::DeadTraces { dead, count, first } => write!(
+                f,
+                "{dead} of {count} traces are marked as dead or dummy (identification codes 2 and 3), \
+                 the first of them trace {first}; they are taken as missing, and their samples are 0"
+            ),
+            Self::AllDead { count } => write!(
+                f,
+                "all {count} traces are marked as dead or dummy (identification codes 2 and 3); their \
+                 samples are taken as they are"
+            ),
+            Self::TracesByPosition { count, shape: [nx, ny] } => write!(
+                f,
+                "{count} traces without inline and crossline numbers; by X and Y they are a grid of \
+                 {nx} × {ny}"
+            ),
             Self::NoCoordinates { bytes } => write!(
                 f,
                 "no trace has coordinates at bytes {bytes}; traces are taken to be 1 apart"
@@ -162,6 +301,44 @@ impl fmt::Display for ReadNote {
             Self::Line { first: [x0, y0], last: [x1, y1] } => {
                 write!(f, "x is the distance along the line from ({x0}, {y0}) to ({x1}, {y1})")
             }
+            Self::CrookedLine { first: [x0, y0], last: [x1, y1], length } => write!(
+                f,
+                "x is the distance along the line, {length} from ({x0}, {y0}) to ({x1}, {y1}), in \
+                 even steps"
+            ),
+            Self::UnevenLine { trace, distance, tolerance } => write!(
+                f,
+                "the traces stand unevenly along the line: trace {trace} is {distance:.4} from its \
+                 place by even steps; expected at most {tolerance:.4}"
+            ),
+            Self::NegativeInterval { of, stated, source, taken } => write!(
+                f,
+                "the sample interval of {of} is {stated}; expected a number above 0: {taken} of \
+                 {source} is taken"
+            ),
+            Self::IntervalsDiffer { source, taken, trace, other, count } => write!(
+                f,
+                "{count} traces have another sample interval than {source}, {taken}; the first of them is \
+                 trace {trace}, {other}: that of {source} is taken, since {}",
+                source.reason()
+            ),
+            Self::SampleFormat { stated, range, other, other_range, is_told } => {
+                let ([least, most], [other_least, other_most]) = (range, other_range);
+                write!(
+                    f,
+                    "by the format code samples are {stated} numbers, of sizes from {least} to {most}; "
+                )?;
+                match is_told {
+                    true => write!(f, "their bits are those of {other} numbers")?,
+                    false => write!(f, "their bits may be those of {other} numbers too")?,
+                }
+                write!(f, ", of sizes from {other_least} to {other_most}")
+            }
+            Self::TimeScalar { trace, scalar } => write!(
+                f,
+                "the scalar of times of trace {trace} is {scalar}; expected 1, 10, 100, 1000 or 10000, \
+                 or one of these negative: times are taken as stored"
+            ),
             Self::Vertical { interval, spacing, is_known } => {
                 write!(
                     f,
@@ -181,6 +358,11 @@ impl fmt::Display for ReadNote {
                 f,
                 "trace {trace} begins at {other} ms, the first at {first} ms; all are taken to begin \
                  with the first"
+            ),
+            Self::DataBeside { named } => write!(
+                f,
+                "samples are those of the file beside the header that has the name of {}",
+                named.display()
             ),
             Self::Axes { order, is_known } => {
                 write!(f, "x, y (and z) are the file's axes {}", order.join(", "))?;

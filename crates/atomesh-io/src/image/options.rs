@@ -1,6 +1,9 @@
 //! How to read an image: what its file may not say.
 
+use std::path::PathBuf;
+
 use super::sample_type::{ByteOrder, SampleType};
+use super::traces::SampleFormat;
 
 /// How to read an image.
 #[derive(Clone, Debug, Default)]
@@ -10,6 +13,11 @@ pub struct ReadOptions {
     pub raw: Option<RawLayout>,
     /// What a SEG-Y file may not say; of RSF files, whether the first axis is vertical.
     pub segy: SegyOptions,
+    /// A folder in which, and below which, headers may name the files of their samples. Default: the header's
+    /// own folder alone.
+    pub data_root: Option<PathBuf>,
+    /// The most bytes that the samples of an image may take. Default: as many as the system gives.
+    pub memory_limit: Option<u64>,
 }
 
 /// What a raw file does not say about itself.
@@ -34,6 +42,8 @@ pub struct SegyOptions {
     /// The first bytes of X and Y. Default: the first of 181 and 185, 73 and 77, 81 and 85 that
     /// vary.
     pub coordinate_bytes: Option<[usize; 2]>,
+    /// How samples are written; goes before the format code of the header. Default: what that says.
+    pub sample_format: Option<SampleFormat>,
     /// What the samples of a trace are along. Default: unknown, which leaves its unit unnamed.
     pub vertical: Option<Vertical>,
 }

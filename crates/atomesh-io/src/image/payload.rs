@@ -3,13 +3,15 @@
 
 use std::fs::File;
 use std::io::{self, BufRead, BufReader, Read};
-use std::path::{Path, PathBuf};
+use std::path::PathBuf;
 
 use atomesh::image::Samples;
 use flate2::bufread::{MultiGzDecoder, ZlibDecoder};
 
+use super::detached::DataFolders;
 use super::error::ReadReason;
 use super::format::ImageFormat;
+use super::memory::Memory;
 use super::sample_type::{ByteOrder, SampleType};
 use super::shape::plausible_count;
 use super::stream::{self, GZIP_RATIO, Layout};
@@ -61,28 +63,11 @@ impl Payload {
         &self,
         source: BufReader<Watched<R>>,
         rest: u64,
-        folder: Option<&Path>,
+        folders: Option<DataFolders>,
+        memory: Memory,
     ) -> Result<Samples, ReadReason> {
-        let Some(names) = &self.files else { return self.decode(source, rest) };
-        let Some(folder) = folder else {
-            return Err(ReadReason::Unsupported {
-                format: self.format,
-                found: format!("a header whose samples are in {names:?}"),
-                expected: "samples after the header where there is no folder",
-            });
-        };
-        let mut paths = Vec::new();
-        let mut bytes = 0;
-        for name in names {
-            let path = folder.join(name);
-            let metadata = path.metadata().and_then(|m| match m.is_file() {
-                true => Ok(m),
-                false => Err(io::ErrorKind::IsADirectory.into()),
-            });
-            bytes +=
-                metadata.map_err(|error| ReadReason::DataFile { path: name.into(), error })?.len();
-            paths.push(path);
-        }
+        let Some(names) = &self.files else { return self.decode(source, rest, memory) };
+        let (paths, bytes) = self.found(names, folders)?;
         // of one file, what stands before its samples is left out as after a header
         let (before, of_whole) = match (paths.len(), self.byte_skip) {
             (..2, skip) => ((0, 0), (self.line_skip, skip)),
@@ -94,7 +79,33 @@ impl Payload {
         let chain = Chain { paths: paths.into_iter(), before, open: None };
         let source = BufReader::with_capacity(1 << 16, source.into_inner().over(chain, bytes));
         let (line_skip, byte_skip) = of_whole;
-        Self { line_skip, byte_skip, ..self.clone() }.decode(source, bytes)
+        Self { line_skip, byte_skip, ..self.clone() }.decode(source, bytes, memory)
+    }
+
+    /// The files of samples, and the bytes in all of them.
+    fn found(
+        &self,
+        names: &[String],
+        folders: Option<DataFolders>,
+    ) -> Result<(Vec<PathBuf>, u64), ReadReason> {
+        let unsupported =
+            |found, expected| ReadReason::Unsupported { format: self.format, found, expected };
+        let Some(folders) = folders else {
+            let found = format!("a header whose samples are in {} other files", names.len());
+            let expected = "samples after the header where there is no folder";
+            return Err(unsupported(found, expected));
+        };
+        if names.len() > MOST_FILES {
+            return Err(unsupported(format!("samples in {} files", names.len()), "65536 at most"));
+        }
+        check_apart(names)?;
+        let (mut paths, mut bytes) = (Vec::new(), 0_u64);
+        for name in names {
+            let (path, length) = folders.find(name)?;
+            bytes = bytes.saturating_add(length);
+            paths.push(path);
+        }
+        Ok((paths, bytes))
     }
 
     fn unsupported(&self, found: &str) -> ReadReason {
@@ -106,7 +117,12 @@ impl Payload {
     }
 
     /// Reads the samples from a stream of `bytes` bytes that holds them all.
-    fn decode(&self, mut source: impl BufRead, bytes: u64) -> Result<Samples, ReadReason> {
+    fn decode(
+        &self,
+        mut source: impl BufRead,
+        bytes: u64,
+        memory: Memory,
+    ) -> Result<Samples, ReadReason> {
         let size = self.sample_type.size() as u64;
         let density = match self.encoding {
             Encoding::Raw => ABSURD,
@@ -126,15 +142,15 @@ impl Payload {
                     return Err(ReadReason::Truncated { expected: count as u64, found });
                 }
                 skip_bytes(&mut source, skip).map_err(ReadReason::Io)?;
-                self.samples(&mut source, count, count)
+                self.samples(&mut source, [count; 2], memory)
             }
             Encoding::Text => {
                 self.skip_inside(&mut source)?;
                 let mut words = TextSamples::new(source, self.sample_type);
-                self.samples(&mut words, count, count)
+                self.samples(&mut words, [count; 2], memory)
             }
-            Encoding::Gzip => self.unpack(MultiGzDecoder::new(source), count, bytes),
-            Encoding::Zlib => self.unpack(ZlibDecoder::new(source), count, bytes),
+            Encoding::Gzip => self.unpack(MultiGzDecoder::new(source), count, bytes, memory),
+            Encoding::Zlib => self.unpack(ZlibDecoder::new(source), count, bytes, memory),
         }
     }
 
@@ -145,10 +161,11 @@ impl Payload {
         mut packed: impl Read,
         count: usize,
         bytes: u64,
+        memory: Memory,
     ) -> Result<Samples, ReadReason> {
         self.skip_inside(&mut packed)?;
         let reserve = (bytes as usize / self.sample_type.size()).saturating_mul(4);
-        let samples = self.samples(&mut packed, count, reserve)?;
+        let samples = self.samples(&mut packed, [count, reserve], memory)?;
         packed.read(&mut [0]).map_err(|e| ReadReason::decoder(self.format, e))?;
         Ok(samples)
     }
@@ -163,8 +180,8 @@ impl Payload {
     fn samples(
         &self,
         source: &mut dyn Read,
-        count: usize,
-        reserve: usize,
+        [count, reserve]: [usize; 2],
+        memory: Memory,
     ) -> Result<Samples, ReadReason> {
         // text is turned into bytes with the least significant first
         let byte_order =
@@ -176,8 +193,19 @@ impl Payload {
             reserve,
             scale: None,
             turned: None,
+            memory,
         };
         stream::read_samples(source, &layout)
+    }
+}
+
+/// Refuses names that come twice: a short file would stand for any number of samples.
+fn check_apart(names: &[String]) -> Result<(), ReadReason> {
+    let mut sorted: Vec<&String> = names.iter().collect();
+    sorted.sort_unstable();
+    match sorted.chunk_by(|a, b| a == b).find(|same| same.len() > 1) {
+        Some(same) => Err(ReadReason::DataTwice { path: same[0].into(), times: same.len() }),
+        None => Ok(()),
     }
 }
 

@@ -39,13 +39,16 @@ const WORKING_MEMORY: u64 = 64 << 20;
 
 /// Decodes a flat image, colour to luminance in place.
 fn read(source: Source) -> Result<LoadedImage, ReadReason> {
-    let file_bytes = source.length;
+    let (file_bytes, memory) = (source.length, source.memory);
     let mut bytes = BufReader::new(source.bytes);
     refuse_broken_palettes(&mut bytes)?;
     let most = file_bytes.saturating_mul(8 * DENSITY).saturating_add(WORKING_MEMORY);
+    let most = source.options.memory_limit.map_or(most, |limit| most.min(limit));
     let limits = ::png::Limits { bytes: usize::try_from(most).unwrap_or(usize::MAX) };
     let mut decoder = ::png::Decoder::new_with_limits(bytes, limits);
+    // what is not looked at is not unpacked
     decoder.set_ignore_text_chunk(true);
+    decoder.set_ignore_iccp_chunk(true);
     decoder.set_transformations(Transformations::EXPAND);
     let mut reader = decoder.read_info().map_err(reason)?;
     let shape = [reader.info().width as usize, reader.info().height as usize];
@@ -61,12 +64,12 @@ fn read(source: Source) -> Result<LoadedImage, ReadReason> {
             });
         }
         (_, BitDepth::Eight) => {
-            let mut decoded: Vec<u8> = stream::zeros(values)?;
+            let mut decoded: Vec<u8> = memory.zeros(values)?;
             reader.next_frame(&mut decoded).map_err(reason)?;
             Samples::U8(grey(decoded, color.samples()))
         }
         (_, BitDepth::Sixteen) => {
-            let mut decoded: Vec<u16> = stream::zeros(values)?;
+            let mut decoded: Vec<u16> = memory.zeros(values)?;
             reader.next_frame(bytemuck::cast_slice_mut(&mut decoded)).map_err(reason)?;
             decoded.iter_mut().for_each(|value| *value = u16::from_be(*value));
             Samples::U16(grey(decoded, color.samples()))

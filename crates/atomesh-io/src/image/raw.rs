@@ -25,7 +25,7 @@ pub(super) const CODEC: Codec = Codec {
 
 /// Reads a raw file, whose size must be exactly what the layout says.
 fn read(source: Source) -> Result<LoadedImage, ReadReason> {
-    let Source { bytes: mut source, length: file_bytes, options, .. } = source;
+    let Source { bytes: mut source, length: file_bytes, options, memory, .. } = source;
     let layout = options.raw.as_ref().ok_or(ReadReason::NoRawLayout)?;
     let RawLayout { shape, sample_type, byte_order, offset } = layout;
     if !(2..=3).contains(&shape.len()) {
@@ -52,6 +52,7 @@ fn read(source: Source) -> Result<LoadedImage, ReadReason> {
         reserve: count,
         scale: None,
         turned: None,
+        memory,
     };
     let samples = stream::read_samples(&mut source, &layout)?;
     Ok(AnyImage::frameless(shape, samples)?.into())

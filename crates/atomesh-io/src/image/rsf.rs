@@ -11,15 +11,17 @@
 
 use std::collections::BTreeMap;
 use std::fs::File;
-use std::io::{self, Read, Seek, SeekFrom};
-use std::path::{Path, PathBuf};
+use std::io::{Read, Seek, SeekFrom};
+use std::path::PathBuf;
 
 use atomesh::image::{Frame, Image, Samples};
 
 use super::any_image::AnyImage;
 use super::codec::{Codec, Source};
+use super::detached::DataFolders;
 use super::error::ReadReason;
 use super::format::ImageFormat;
+use super::memory::Memory;
 use super::note::{LoadedImage, ReadNote};
 use super::options::Vertical;
 use super::sample_type::{ByteOrder, SampleType};
@@ -27,7 +29,7 @@ use super::shape::plausible_count;
 use super::spelling;
 use super::stream::{self, Layout};
 use super::text::shortened;
-use super::traces::{self, Number, TraceLayout};
+use super::traces::{self, SampleFormat, TraceLayout};
 
 const FORMAT: ImageFormat = ImageFormat::named("RSF");
 
@@ -48,20 +50,20 @@ fn wrong(field: &'static str, value: &str, expected: &'static str) -> ReadReason
 /// Reads a flat image or a volume.
 fn read(source: Source) -> Result<LoadedImage, ReadReason> {
     let vertical = source.options.segy.vertical;
-    let Source { bytes: mut source, length: file_bytes, folder, .. } = source;
+    let Source { bytes: mut source, length: file_bytes, folders, memory, .. } = source;
     let mut text = vec![0; file_bytes.min(LONGEST_TEXT) as usize];
     let filled = stream::fill(&mut source, &mut text)?;
     text.truncate(filled);
     let end = text.windows(END_OF_TEXT.len()).position(|at| at == END_OF_TEXT);
     let header = Header::parse(&String::from_utf8_lossy(&text[..end.unwrap_or(filled)]), vertical)?;
-    let samples = match (header.data.as_str(), folder) {
+    let samples = match (header.data.as_str(), folders) {
         ("stdin" | "stdout", _) => {
             let Some(end) = end else {
                 return Err(wrong("in", &header.data, "samples after two form feeds and ^D"));
             };
             let start = (end + END_OF_TEXT.len()) as u64;
             source.seek(SeekFrom::Start(start)).map_err(ReadReason::Io)?;
-            header.samples(&mut source, file_bytes - start)?
+            header.samples(&mut source, file_bytes - start, memory)?
         }
         (_, None) => {
             return Err(ReadReason::Unsupported {
@@ -70,28 +72,29 @@ fn read(source: Source) -> Result<LoadedImage, ReadReason> {
                 expected: "samples after the header where there is no folder",
             });
         }
-        (name, Some(folder)) => {
-            let (mut file, bytes) = open(folder, name)?;
-            header.samples(&mut file, bytes)?
+        (name, Some(folders)) => {
+            let (mut file, bytes, moved) = open(folders, name)?;
+            let samples = header.samples(&mut file, bytes, memory)?;
+            return Ok(header.place(samples)?.noting(moved));
         }
     };
     header.place(samples)
 }
 
-/// Opens the file of samples: where the text says, or else beside it, since headers move.
-fn open(folder: &Path, name: &str) -> Result<(File, u64), ReadReason> {
+/// Opens the file of samples: where the text says, or else beside it, since headers move; a note says so.
+fn open(folders: DataFolders, name: &str) -> Result<(File, u64, Option<ReadNote>), ReadReason> {
+    let refusal = match folders.open(name) {
+        Ok((file, bytes)) => return Ok((file, bytes, None)),
+        Err(refusal) => refusal,
+    };
     let named = PathBuf::from(name);
-    let beside = named.file_name().map(|name| folder.join(name));
-    let found = File::open(folder.join(&named)).or_else(|e| match beside {
-        Some(path) => File::open(path).map_err(|_| e),
-        None => Err(e),
-    });
-    let bytes = found.and_then(|file| {
-        let metadata = file.metadata()?;
-        let is_file = metadata.is_file();
-        if is_file { Ok((file, metadata.len())) } else { Err(io::ErrorKind::IsADirectory.into()) }
-    });
-    bytes.map_err(|error| ReadReason::DataFile { path: named, error })
+    let Some(beside) = named.file_name().and_then(|name| name.to_str()) else {
+        return Err(refusal);
+    };
+    match folders.open(beside) {
+        Ok((file, bytes)) => Ok((file, bytes, Some(ReadNote::DataBeside { named }))),
+        Err(_) => Err(refusal),
+    }
 }
 
 /// An axis of the array.
@@ -165,30 +168,43 @@ impl Header {
     }
 
     /// Reads the samples, x fastest.
-    fn samples(&self, source: &mut dyn Read, bytes: u64) -> Result<Samples, ReadReason> {
+    fn samples(
+        &self,
+        source: &mut dyn Read,
+        bytes: u64,
+        memory: Memory,
+    ) -> Result<Samples, ReadReason> {
         let shape: Vec<usize> = self.axes.iter().map(|axis| axis.count).collect();
         let Encoding::Binary(sample_type, byte_order) = self.encoding else {
             // a number takes two bytes at least, a digit and a space
             let count = plausible_count(&shape, bytes.saturating_add(1) / 2, 1)?;
+            memory.check(bytes.into())?;
             let numbers = text_numbers(source, count)?;
             let encoding = Encoding::Binary(SampleType::F32, ByteOrder::Little);
             let binary = Self { encoding, data: String::new(), axes: self.axes.clone(), ..*self };
-            return binary.samples(&mut &numbers[..], numbers.len() as u64);
+            return binary.samples(&mut &numbers[..], numbers.len() as u64, memory);
         };
         let count = plausible_count(&shape, bytes, 1 << 10)?;
         let found = bytes / sample_type.size() as u64;
         if count as u64 > found {
             return Err(ReadReason::Truncated { expected: count as u64, found });
         }
-        let Some(number) = number_of(sample_type).filter(|_| self.is_vertical) else {
+        let Some(format) = format_of(sample_type).filter(|_| self.is_vertical) else {
             let (reserve, scale, turned) = (count, None, None);
-            let layout = Layout { sample_type, byte_order, count, reserve, scale, turned };
+            let layout = Layout { sample_type, byte_order, count, reserve, scale, turned, memory };
             return stream::read_samples(source, &layout);
         };
         let places: Vec<usize> = (0..count / shape[0].max(1)).collect();
         let (samples, plane) = (shape[0], places.len());
-        let layout =
-            TraceLayout { number, byte_order, header_bytes: 0, samples, places: &places, plane };
+        let layout = TraceLayout {
+            format,
+            byte_order,
+            header_bytes: 0,
+            samples,
+            places: &places,
+            plane,
+            memory,
+        };
         traces::read(source, &layout)
     }
 
@@ -212,7 +228,7 @@ impl Header {
             [x, y, z] => AnyImage::Volume(Image::new(frame([x, y, z])?, samples)?),
             _ => return Err(wrong("n", &axes.len().to_string(), "2 or 3 axes")),
         };
-        Ok(LoadedImage { image, units, notes })
+        Ok(LoadedImage { image, units, absent: None, notes })
     }
 }
 
@@ -286,13 +302,13 @@ fn encoding(name: &str, element_bytes: Option<&str>) -> Result<Encoding, ReadRea
 }
 
 /// How a trace's reader calls a type.
-fn number_of(sample_type: SampleType) -> Option<Number> {
+fn format_of(sample_type: SampleType) -> Option<SampleFormat> {
     Some(match sample_type {
-        SampleType::F32 => Number::F32,
-        SampleType::F64 => Number::F64,
-        SampleType::I32 => Number::I32,
-        SampleType::I16 => Number::I16,
-        SampleType::U8 => Number::U8,
+        SampleType::F32 => SampleFormat::F32,
+        SampleType::F64 => SampleFormat::F64,
+        SampleType::I32 => SampleFormat::I32,
+        SampleType::I16 => SampleFormat::I16,
+        SampleType::U8 => SampleFormat::U8,
         _ => return None,
     })
 }
@@ -301,9 +317,12 @@ fn number_of(sample_type: SampleType) -> Option<Number> {
 fn text_numbers(source: &mut dyn Read, count: usize) -> Result<Vec<u8>, ReadReason> {
     let mut text = String::new();
     source.read_to_string(&mut text).map_err(|e| ReadReason::decoder(FORMAT, e))?;
-    let mut bytes = Vec::with_capacity(4 * count);
-    for word in text.split_ascii_whitespace().take(count) {
-        let value: f32 = word.parse().map_err(|_| wrong("sample", word, "a number"))?;
+    let mut bytes = Vec::new();
+    // the words are not told: the file may be any that the header names
+    for (k, word) in text.split_ascii_whitespace().take(count).enumerate() {
+        let wrong =
+            |_| wrong("sample", &format!("number {} of the file", k + 1), "a decimal number");
+        let value: f32 = word.parse().map_err(wrong)?;
         bytes.extend(value.to_le_bytes());
     }
     Ok(bytes)

@@ -10,6 +10,7 @@ use atomesh::watch::{Phase, Watch, check};
 
 use super::error::{ReadReason, WriteReason};
 use super::format::ImageFormat;
+use super::memory::Memory;
 use super::sample_type::{ByteOrder, SampleType};
 
 /// The most bytes that a byte of gzip or zlib can stand for.
@@ -32,6 +33,8 @@ pub(super) struct Layout {
     pub scale: Option<(f64, f64)>,
     /// The shape x, y, z of an image that comes with z fastest; it is turned to x fastest.
     pub turned: Option<[usize; 3]>,
+    /// The memory that the samples may take.
+    pub memory: Memory,
 }
 
 /// Reads the samples, exactly as many as the layout says.
@@ -73,11 +76,13 @@ fn collect<const N: usize, T: Copy + Default>(
     layout: &Layout,
     decode: impl Fn([u8; N]) -> T,
 ) -> Result<Vec<T>, ReadReason> {
+    let memory = layout.memory;
+    memory.check(layout.count as u128 * size_of::<T>() as u128)?;
     let mut samples = Vec::new();
-    reserve(&mut samples, layout.reserve.min(layout.count))?;
+    memory.reserve(&mut samples, layout.reserve.min(layout.count))?;
     let mut places = layout.turned.map(turned_places);
     if places.is_some() {
-        reserve(&mut samples, layout.count)?;
+        memory.reserve(&mut samples, layout.count)?;
         samples.resize(layout.count, T::default());
     }
     let mut buffer = vec![0; BLOCK.min(layout.count) * N];
@@ -99,34 +104,11 @@ fn collect<const N: usize, T: Copy + Default>(
                 samples[place] = decode(*number);
             }
         } else {
-            grow(&mut samples, wanted, layout.count)?;
+            memory.grow(&mut samples, wanted, layout.count)?;
             samples.extend(numbers.iter().map(|&n| decode(n)));
         }
         done += wanted;
     }
-    Ok(samples)
-}
-
-/// Reserves memory for `wanted` more samples: twice what is reserved, but at most `count` in all.
-pub(super) fn grow<T>(samples: &mut Vec<T>, wanted: usize, count: usize) -> Result<(), ReadReason> {
-    if samples.capacity() - samples.len() >= wanted {
-        return Ok(());
-    }
-    reserve(samples, (2 * samples.capacity()).min(count).max(samples.len() + wanted))
-}
-
-/// Reserves memory for `count` samples in all.
-fn reserve<T>(samples: &mut Vec<T>, count: usize) -> Result<(), ReadReason> {
-    samples
-        .try_reserve_exact(count - samples.len())
-        .map_err(|_| ReadReason::Memory { bytes: count as u128 * size_of::<T>() as u128 })
-}
-
-/// A vector of `count` zeros.
-pub(super) fn zeros<T: Copy + Default>(count: usize) -> Result<Vec<T>, ReadReason> {
-    let mut samples = Vec::new();
-    reserve(&mut samples, count)?;
-    samples.resize(count, T::default());
     Ok(samples)
 }
 
@@ -216,6 +198,7 @@ mod tests {
             reserve: count,
             scale: None,
             turned: None,
+            memory: Memory::default(),
         }
     }
 
@@ -254,6 +237,12 @@ mod tests {
             read_samples(&mut &[0u8; 100][..], &absurd),
             Err(ReadReason::Truncated { found: 100, .. })
         ));
+        absurd.memory = Memory::up_to(Some(1 << 30));
+        assert!(matches!(
+            read_samples(&mut &[0u8; 100][..], &absurd),
+            Err(ReadReason::Memory { limit: Some(_), .. })
+        ));
+        absurd.memory = Memory::default();
         absurd.reserve = absurd.count;
         assert!(matches!(
             read_samples(&mut &[0u8; 100][..], &absurd),

@@ -17,9 +17,9 @@ use super::codec::{Begins, Codec, Output, Source};
 use super::colour::{first_of, grey, in_place};
 use super::error::{ReadReason, WriteReason};
 use super::format::ImageFormat;
+use super::memory::Memory;
 use super::note::LoadedImage;
 use super::shape::{plausible_count, shape_text};
-use super::stream;
 use super::view::ImageView;
 
 const FORMAT: ImageFormat = ImageFormat::named("TIFF");
@@ -38,7 +38,7 @@ const DENSITY: u64 = 4096;
 
 /// Reads all pages. They are compared before the first one is decoded.
 fn read(source: Source) -> Result<LoadedImage, ReadReason> {
-    let file_bytes = source.length;
+    let (file_bytes, memory) = (source.length, source.memory);
     let bytes = BufReader::with_capacity(1 << 16, source.bytes);
     let mut decoder = Decoder::new(bytes).map_err(reason)?;
     let first = Page::of(&mut decoder)?;
@@ -61,6 +61,7 @@ fn read(source: Source) -> Result<LoadedImage, ReadReason> {
         _ => vec![first.width, first.height, page_count],
     };
     let count = plausible_count(&shape, file_bytes, DENSITY)?;
+    memory.check(count as u128 * first.sample_bytes())?;
 
     let mut limits = Limits::default();
     limits.decoding_buffer_size = count.saturating_mul(4 * 8);
@@ -73,7 +74,7 @@ fn read(source: Source) -> Result<LoadedImage, ReadReason> {
             decoder.seek_to_image(page).map_err(reason)?;
         }
         let plane = samples(decoder.read_image().map_err(reason)?, first.color)?;
-        append(&mut volume, plane, count)?;
+        append(&mut volume, plane, count, memory)?;
     }
     match volume {
         Some(samples) => Ok(AnyImage::frameless(&shape, samples)?.into()),
@@ -122,6 +123,11 @@ impl Page {
             color,
             sample_format: layout.sample_format,
         })
+    }
+
+    /// The bytes of a sample with all its channels.
+    fn sample_bytes(&self) -> u128 {
+        u128::from(self.color.bit_depth()) * u128::from(self.color.num_samples()) / 8
     }
 
     /// Shape and type for a message.
@@ -210,12 +216,17 @@ impl FromDouble for f64 {
 }
 
 /// Puts a plane behind those that are there; the first one is taken as it is.
-fn append(volume: &mut Option<Samples>, plane: Samples, count: usize) -> Result<(), ReadReason> {
+fn append(
+    volume: &mut Option<Samples>,
+    plane: Samples,
+    count: usize,
+    memory: Memory,
+) -> Result<(), ReadReason> {
     macro_rules! extend {
         ($($kind:ident),*) => {
             match (volume.as_mut(), plane) {
                 $((Some(Samples::$kind(all)), Samples::$kind(more)) => {
-                    stream::grow(all, more.len(), count)?;
+                    memory.grow(all, more.len(), count)?;
                     all.extend_from_slice(&more);
                 })*
                 (_, plane) => *volume = Some(plane), // pages of one type: only the first comes here

@@ -17,6 +17,7 @@ use super::affine::{self, Affine};
 use super::codec::{Begins, Codec, Output, Source};
 use super::error::{ReadReason, WriteReason};
 use super::format::ImageFormat;
+use super::memory::Memory;
 use super::note::{LoadedImage, ReadNote};
 use super::sample_type::ByteOrder;
 use super::shape::plausible_count;
@@ -60,11 +61,9 @@ fn unsupported(found: String, expected: &'static str) -> ReadReason {
 
 /// Reads a `.vti` file, which is held whole meanwhile.
 fn read(source: Source) -> Result<LoadedImage, ReadReason> {
-    let Source { bytes: mut source, length: file_bytes, .. } = source;
+    let Source { bytes: mut source, length: file_bytes, memory, .. } = source;
     let mut bytes = Vec::new();
-    let room = usize::try_from(file_bytes).unwrap_or(usize::MAX);
-    let memory = |_| ReadReason::Memory { bytes: file_bytes.into() };
-    bytes.try_reserve_exact(room).map_err(memory)?;
+    memory.reserve(&mut bytes, usize::try_from(file_bytes).unwrap_or(usize::MAX))?;
     source.read_to_end(&mut bytes).map_err(ReadReason::Io)?;
     let decoder = |e| ReadReason::decoder(FORMAT, e);
     let document = Document::parse(&bytes, KIND).map_err(decoder)?;
@@ -89,7 +88,7 @@ fn read(source: Source) -> Result<LoadedImage, ReadReason> {
         affine.origin[r] += (0..3).map(|c| affine.matrix[r][c] * start[c]).sum::<f64>();
     }
     let axes = if shape[2] == 1 { 2 } else { 3 };
-    let read = || samples(array, &shape, file_bytes);
+    let read = || samples(array, &shape, file_bytes, memory);
     let image = affine::image(FORMAT, &shape[..axes], affine, read)?;
     Ok(LoadedImage::from(image).noting(is_of_cells.then_some(ReadNote::Cells)))
 }
@@ -143,20 +142,34 @@ fn scalars<'a, 'b>(piece: &'b Piece<'a>) -> Result<(&'b Array<'a>, bool), ReadRe
 }
 
 /// The samples of an array.
-fn samples(array: &Array, shape: &[usize; 3], file_bytes: u64) -> Result<Samples, ReadReason> {
+fn samples(
+    array: &Array,
+    shape: &[usize; 3],
+    file_bytes: u64,
+    memory: Memory,
+) -> Result<Samples, ReadReason> {
     let sample_type = spelling::named(array.kind, |own| own.vtk).ok_or_else(|| {
         unsupported(format!("samples of type {}", array.kind), "Int8 ... Float64")
     })?;
     let count = plausible_count(shape, file_bytes, GZIP_RATIO)?;
     let is_big = array.layout.endian == Endian::Big && !matches!(array.place, Place::Text(_));
     let byte_order = if is_big { ByteOrder::Big } else { ByteOrder::Little };
-    let layout =
-        Layout { sample_type, byte_order, count, reserve: count, scale: None, turned: None };
+    let layout = Layout {
+        sample_type,
+        byte_order,
+        count,
+        reserve: count,
+        scale: None,
+        turned: None,
+        memory,
+    };
     if let Place::Text(at) = array.place {
         let count = plausible_count(shape, file_bytes, 1)?;
         let mut words = TextSamples::new(array.text(at).as_bytes(), sample_type);
         return stream::read_samples(&mut words, &Layout { count, ..layout });
     }
+    // twice, as bytes and as samples
+    memory.check(2 * count as u128 * sample_type.size() as u128)?;
     let bytes = array.bytes(count.checked_mul(sample_type.size()));
     let bytes = bytes.map_err(|e| ReadReason::decoder(FORMAT, e))?;
     stream::read_samples(&mut &bytes[..], &layout)

@@ -1,11 +1,16 @@
 //! Images as options describe them: frame, box of interest, raw layout.
 
+use std::path::PathBuf;
+
 use atomesh::image::{Frame, FrameError, Image};
-use atomesh_io::image::{ByteOrder, RawLayout, ReadOptions, SampleType, SegyOptions, Vertical};
+use atomesh_io::image::{
+    ByteOrder, RawLayout, ReadOptions, SampleFormat, SampleType, SegyOptions, Vertical,
+};
 use serde::{Deserialize, Serialize};
 
 use super::section::section;
 use crate::error::JobError;
+use crate::memory;
 use crate::values::{Counts, Numbers, Text, WorldBox};
 #[cfg(feature = "clap")]
 use crate::values::{named, number_in};
@@ -64,6 +69,13 @@ section! {
         /// the first of these that vary
         #[arg(long, value_name = "X,Y")]
         pub coordinate_bytes: Counts,
+        /// SEG-Y: how samples are written, whatever the header's format code says. Default: what that says
+        #[arg(long, value_name = "FORMAT", value_parser = named::<SampleFormat>(SampleFormat::NAMES))]
+        pub sample_format: SampleFormat,
+        /// Folder in which, and below which, the headers of NRRD, MetaImage and RSF may name the files of
+        /// their samples. Default: the header's own folder
+        #[arg(long, value_name = "DIR")]
+        pub data_root: PathBuf,
         /// SEG-Y: the axis along a trace, time (milliseconds) or depth (metres or feet).
         /// RSF: the first axis is vertical, whatever its label says
         #[arg(long, value_name = "AXIS", value_parser = named::<Vertical>(&["time", "depth"]))]
@@ -105,9 +117,14 @@ impl FrameOptions {
         let segy = SegyOptions {
             trace_bytes: pair("--trace-bytes", &self.trace_bytes)?,
             coordinate_bytes: pair("--coordinate-bytes", &self.coordinate_bytes)?,
+            sample_format: self.sample_format,
             vertical: self.vertical,
         };
-        Ok(ReadOptions { raw: self.raw_layout()?, segy })
+        if let Some(root) = self.data_root.as_ref().filter(|root| !root.is_dir()) {
+            return Err(JobError::misuse(format!("--data-root {} is no folder", root.display())));
+        }
+        let data_root = self.data_root.clone();
+        Ok(ReadOptions { raw: self.raw_layout()?, segy, data_root, memory_limit: memory::room() })
     }
 
     /// The frame with what the options override.

@@ -224,8 +224,9 @@ impl RunConfig {
 
     /// The same with names of files that are no text spelt as nearly as text can, for reports.
     pub(crate) fn in_words(mut self) -> Self {
-        let Self { input, output, .. } = &mut self;
-        for path in input.files_mut().into_iter().chain(output.files_mut()).flatten() {
+        let Self { input, output, frame, .. } = &mut self;
+        let files = input.files_mut().into_iter().chain(output.files_mut());
+        for path in files.chain([frame.data_root.as_mut()]).flatten() {
             if path.to_str().is_none() {
                 *path = path.to_string_lossy().into_owned().into();
             }
@@ -238,6 +239,7 @@ impl RunConfig {
         let mut run = self.clone().with_defaults::<D>();
         run.input = InputOptions::default();
         run.output = OutputOptions::default();
+        run.frame.data_root = None;
         let seed = run.optimize.seed.unwrap_or(0);
         let options = serde_json::to_value(run).unwrap_or_default();
         Provenance { version: env!("CARGO_PKG_VERSION").into(), options, seed }

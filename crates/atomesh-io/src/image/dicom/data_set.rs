@@ -335,7 +335,7 @@ impl<R: Read + Seek> Reader<R> {
         }
         let mut bytes = Vec::new();
         let room = usize::try_from(length).unwrap_or(usize::MAX);
-        let memory = |_| ReadReason::Memory { bytes: length.into() };
+        let memory = |_| ReadReason::Memory { bytes: length.into(), limit: None };
         bytes.try_reserve_exact(room).map_err(memory)?;
         self.source.seek(SeekFrom::Start(start)).map_err(ReadReason::Io)?;
         (&mut self.source).take(length).read_to_end(&mut bytes).map_err(ReadReason::Io)?;

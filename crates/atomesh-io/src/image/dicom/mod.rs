@@ -22,7 +22,9 @@ use super::affine::{self, Affine, World};
 use super::codec::{Codec, Folder, Source};
 use super::error::ReadReason;
 use super::format::ImageFormat;
+use super::memory::Memory;
 use super::note::LoadedImage;
+use super::options::ReadOptions;
 
 mod data_set;
 mod series;
@@ -50,6 +52,7 @@ fn is_dicom(path: &Path) -> bool {
 
 /// Reads a file with a single slice.
 fn read(source: Source) -> Result<LoadedImage, ReadReason> {
+    let memory = source.memory;
     let mut reader = Reader::new(source.bytes, source.length);
     let slice = Slice::read(&mut reader)?.ok_or_else(|| ReadReason::Unsupported {
         format: FORMAT,
@@ -59,15 +62,20 @@ fn read(source: Source) -> Result<LoadedImage, ReadReason> {
     let shape = slice.pixels.shape;
     let (affine, world) = flat_affine(&slice);
     let image = affine::image(FORMAT, &shape, affine, || {
-        let mut volume = Volume::new(&slice.pixels, slice.is_plain(), shape[0] * shape[1])?;
-        volume.append(&slice.samples(&mut reader)?, slice.scale);
+        let mut volume = Volume::new(&slice.pixels, slice.is_plain(), shape[0] * shape[1], memory)?;
+        volume.append(&slice.samples(&mut reader, memory)?, slice.scale);
         Ok(volume.samples)
     })?;
     Ok(LoadedImage::from(image).noting(world.note()))
 }
 
 /// Reads the slices in a folder.
-fn read_folder(folder: &Path, watch: &mut dyn Watch) -> Result<LoadedImage, ReadReason> {
+fn read_folder(
+    folder: &Path,
+    options: &ReadOptions,
+    watch: &mut dyn Watch,
+) -> Result<LoadedImage, ReadReason> {
+    let memory = Memory::up_to(options.memory_limit);
     let mut names = Vec::new();
     for entry in fs::read_dir(folder).map_err(ReadReason::Io)? {
         let entry = entry.map_err(ReadReason::Io)?;
@@ -94,10 +102,11 @@ fn read_folder(folder: &Path, watch: &mut dyn Watch) -> Result<LoadedImage, Read
     let [nx, ny] = head.pixels.shape;
     let samples = || {
         let is_plain = slices.iter().all(|(_, slice)| slice.is_plain());
-        let mut volume = Volume::new(&head.pixels, is_plain, nx * ny * slices.len())?;
+        let mut volume = Volume::new(&head.pixels, is_plain, nx * ny * slices.len(), memory)?;
         for (k, (file, slice)) in slices.iter().enumerate() {
             check(watch, Phase::Read, 0.1 + 0.9 * k as f64 / slices.len() as f64, None)?;
-            let values = open(&folder.join(file)).and_then(|mut reader| slice.samples(&mut reader));
+            let values =
+                open(&folder.join(file)).and_then(|mut reader| slice.samples(&mut reader, memory));
             volume.append(&values.map_err(|reason| in_file(file, reason))?, slice.scale);
         }
         Ok(volume.samples)
@@ -153,15 +162,20 @@ struct Volume {
 impl Volume {
     /// Room for `count` samples, in the least type that holds the stored ones, or in single precision
     /// if they are rescaled.
-    fn new(pixels: &Pixels, is_plain: bool, count: usize) -> Result<Self, ReadReason> {
+    fn new(
+        pixels: &Pixels,
+        is_plain: bool,
+        count: usize,
+        memory: Memory,
+    ) -> Result<Self, ReadReason> {
         let samples = match (is_plain, pixels.stored, pixels.is_signed) {
-            (false, ..) => Samples::F32(room(count)?),
-            (_, ..9, false) => Samples::U8(room(count)?),
-            (_, ..9, true) => Samples::I8(room(count)?),
-            (_, ..17, false) => Samples::U16(room(count)?),
-            (_, ..17, true) => Samples::I16(room(count)?),
-            (_, _, false) => Samples::U32(room(count)?),
-            (_, _, true) => Samples::I32(room(count)?),
+            (false, ..) => Samples::F32(room(count, memory)?),
+            (_, ..9, false) => Samples::U8(room(count, memory)?),
+            (_, ..9, true) => Samples::I8(room(count, memory)?),
+            (_, ..17, false) => Samples::U16(room(count, memory)?),
+            (_, ..17, true) => Samples::I16(room(count, memory)?),
+            (_, _, false) => Samples::U32(room(count, memory)?),
+            (_, _, true) => Samples::I32(room(count, memory)?),
         };
         Ok(Self { samples })
     }
@@ -185,9 +199,8 @@ impl Volume {
 }
 
 /// A vector with room for `count` samples.
-fn room<T>(count: usize) -> Result<Vec<T>, ReadReason> {
+fn room<T>(count: usize, memory: Memory) -> Result<Vec<T>, ReadReason> {
     let mut samples = Vec::new();
-    let memory = |_| ReadReason::Memory { bytes: (count * size_of::<T>()) as u128 };
-    samples.try_reserve_exact(count).map_err(memory)?;
+    memory.reserve(&mut samples, count)?;
     Ok(samples)
 }

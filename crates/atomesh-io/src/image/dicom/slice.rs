@@ -4,6 +4,7 @@ use std::io::{Read, Seek};
 
 use super::super::affine::{Affine, World, wrong};
 use super::super::error::ReadReason;
+use super::super::memory::Memory;
 use super::super::sample_type::ByteOrder;
 use super::FORMAT;
 use super::data_set::{DataSet, PixelData, Reader, tag};
@@ -122,19 +123,25 @@ impl Slice {
     }
 
     /// Reads the samples as they are stored, least value black.
-    pub fn samples<R: Read + Seek>(&self, reader: &mut Reader<R>) -> Result<Vec<i64>, ReadReason> {
+    pub fn samples<R: Read + Seek>(
+        &self,
+        reader: &mut Reader<R>,
+        memory: Memory,
+    ) -> Result<Vec<i64>, ReadReason> {
         let size = self.pixels.size();
         let whole = self.pixels.shape[0] * self.pixels.shape[1] * size;
         let (bytes, byte_order) = match self.place {
-            PixelData { start, length: None } if self.is_run_length => {
-                (unpack_runs(&reader.fragments(start)?, whole, size)?, ByteOrder::Little)
-            }
+            PixelData { start, length: None } if self.is_run_length => (
+                unpack_runs(&reader.fragments(start)?, memory.zeros(whole)?, size)?,
+                ByteOrder::Little,
+            ),
             PixelData { start, length: Some(_) } if !self.is_run_length => {
                 (reader.pixel_bytes(start, whole as u64)?, self.byte_order)
             }
             _ => return Err(wrong(FORMAT, "pixel data", "packed otherwise", "as the syntax says")),
         };
-        let mut values = Vec::with_capacity(bytes.len() / size);
+        let mut values = Vec::new();
+        memory.reserve(&mut values, bytes.len() / size)?;
         for sample in bytes.chunks_exact(size) {
             let fold = |number: u64, byte: &u8| number << 8 | u64::from(*byte);
             let number = match byte_order {
@@ -239,9 +246,10 @@ fn check_syntax(syntax: &str) -> Result<bool, ReadReason> {
     ))
 }
 
-/// Unpacks a frame of run lengths (PS3.5, annex G) to samples with the least byte first. There is a
+/// Unpacks a frame of run lengths (PS3.5, annex G) to samples with the least byte first, into all of `bytes`. There is a
 /// segment for each byte of a sample, the most significant first.
-fn unpack_runs(packed: &[u8], whole: usize, size: usize) -> Result<Vec<u8>, ReadReason> {
+fn unpack_runs(packed: &[u8], mut bytes: Vec<u8>, size: usize) -> Result<Vec<u8>, ReadReason> {
+    let whole = bytes.len();
     let bad =
         |value: &str| wrong(FORMAT, "run lengths", value, "a segment for each byte of a sample");
     let word = |k: usize| {
@@ -251,7 +259,6 @@ fn unpack_runs(packed: &[u8], whole: usize, size: usize) -> Result<Vec<u8>, Read
     if word(0) != Some(size) || packed.len() < 64 {
         return Err(bad("other segments"));
     }
-    let mut bytes = vec![0; whole];
     for segment in 0..size {
         let runs = word(1 + segment).and_then(|start| packed.get(start..));
         let runs = runs.ok_or_else(|| bad("a segment outside"))?;
@@ -331,9 +338,9 @@ mod tests {
         packed[8] = 68;
         packed.extend([1, 1, 2, 128]); // high bytes 1, 2
         packed.extend([255, 9, 128, 128]); // low bytes 9, 9
-        assert_eq!(unpack_runs(&packed, 4, 2).unwrap(), [9, 1, 9, 2]);
-        assert!(unpack_runs(&packed, 6, 2).is_err(), "too few");
-        assert!(unpack_runs(&packed, 4, 1).is_err(), "other segments");
-        assert!(unpack_runs(&packed[..40], 4, 2).is_err(), "no header");
+        assert_eq!(unpack_runs(&packed, vec![0; 4], 2).unwrap(), [9, 1, 9, 2]);
+        assert!(unpack_runs(&packed, vec![0; 6], 2).is_err(), "too few");
+        assert!(unpack_runs(&packed, vec![0; 4], 1).is_err(), "other segments");
+        assert!(unpack_runs(&packed[..40], vec![0; 4], 2).is_err(), "no header");
     }
 }

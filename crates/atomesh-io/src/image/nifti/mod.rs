@@ -15,6 +15,7 @@ use super::any_image::AnyImage;
 use super::codec::{Begins, Codec, Output, Source};
 use super::error::{ReadReason, WriteReason};
 use super::format::ImageFormat;
+use super::memory::Memory;
 use super::note::LoadedImage;
 use super::sample_type::SampleType;
 use super::shape::plausible_count;
@@ -32,6 +33,9 @@ pub(super) use quaternion::rotation;
 
 const FORMAT: ImageFormat = ImageFormat::named("NIfTI-1");
 const FORMAT_GZIPPED: ImageFormat = ImageFormat::named("gzipped NIfTI-1");
+
+/// The most bytes that are unpacked behind the samples.
+const MOST_BEHIND: u64 = 1 << 24;
 
 /// The magic word of a gzip stream.
 const GZIP: &[u8] = b"\x1f\x8b";
@@ -58,7 +62,7 @@ pub(super) const GZIPPED: Codec = Codec {
 
 /// Reads a `.nii` file.
 fn read(source: Source) -> Result<LoadedImage, ReadReason> {
-    let Source { bytes: mut source, length: file_bytes, .. } = source;
+    let Source { bytes: mut source, length: file_bytes, memory, .. } = source;
     let header = Header::read(&mut source)?;
     let size = header.sample_type.size() as u64;
     let found = file_bytes.saturating_sub(header.offset) / size;
@@ -67,30 +71,32 @@ fn read(source: Source) -> Result<LoadedImage, ReadReason> {
     if expected > found {
         return Err(ReadReason::Truncated { expected, found });
     }
-    Ok(samples_after(&mut source, &header, expected as usize, expected as usize)?.into())
+    Ok(samples_after(&mut source, &header, [expected as usize; 2], memory)?.into())
 }
 
 /// Reads a `.nii.gz` file. Memory is allocated as samples come, since the unpacked size is not known.
-/// The whole stream is unpacked, so that its check sum is checked.
+/// The stream is unpacked up to its end, so that its check sum is checked, unless that is far behind the samples.
 fn read_gzipped(source: Source) -> Result<LoadedImage, ReadReason> {
-    let file_bytes = source.length;
+    let (file_bytes, memory) = (source.length, source.memory);
     let mut source = MultiGzDecoder::new(std::io::BufReader::with_capacity(1 << 16, source.bytes));
     let header = Header::read(&mut source)?;
     let density = GZIP_RATIO / header.sample_type.size() as u64;
     let count = plausible_count(&header.shape, file_bytes, density)?;
     let packed_samples = file_bytes as usize / header.sample_type.size();
-    let image = samples_after(&mut source, &header, count, packed_samples.saturating_mul(4))?;
-    std::io::copy(&mut source, &mut std::io::sink())
+    let image =
+        samples_after(&mut source, &header, [count, packed_samples.saturating_mul(4)], memory)?;
+    std::io::copy(&mut source.take(MOST_BEHIND), &mut std::io::sink())
         .map_err(|e| ReadReason::decoder(FORMAT_GZIPPED, e))?;
     Ok(image.into())
 }
 
-/// Skips what is between header and samples, and reads those.
+/// Skips what is between header and samples, and reads `count` of those, `reserve` of which memory is allocated for
+/// at once.
 fn samples_after(
     source: &mut dyn Read,
     header: &Header,
-    count: usize,
-    reserve: usize,
+    [count, reserve]: [usize; 2],
+    memory: Memory,
 ) -> Result<AnyImage, ReadReason> {
     let gap = header.offset - header::BYTES as u64;
     let skipped = std::io::copy(&mut source.take(gap), &mut std::io::sink());
@@ -104,6 +110,7 @@ fn samples_after(
         reserve,
         scale: header.scale,
         turned: None,
+        memory,
     };
     affine::image(FORMAT, &header.shape, header.affine, || stream::read_samples(source, &layout))
 }

@@ -35,7 +35,7 @@ const ABSURD: u64 = 1 << 10;
 
 /// Reads an array of two or three axes.
 fn read(source: Source) -> Result<LoadedImage, ReadReason> {
-    let Source { bytes: mut source, length: file_bytes, .. } = source;
+    let Source { bytes: mut source, length: file_bytes, memory, .. } = source;
     let (header, start) = Header::read(&mut source)?;
     let size = header.sample_type.size() as u64;
     let count = plausible_count(&header.shape, file_bytes, ABSURD)?;
@@ -56,6 +56,7 @@ fn read(source: Source) -> Result<LoadedImage, ReadReason> {
         reserve: count,
         scale: None,
         turned,
+        memory,
     };
     let samples = stream::read_samples(&mut source, &layout)?;
     Ok(AnyImage::frameless(&header.shape, samples)?.into())

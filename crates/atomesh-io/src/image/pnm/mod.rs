@@ -13,6 +13,7 @@ use super::codec::{Begins, Codec, Source};
 use super::colour::{Channel, grey};
 use super::error::ReadReason;
 use super::format::ImageFormat;
+use super::memory::Memory;
 use super::note::LoadedImage;
 use super::sample_type::ByteOrder;
 use super::shape::plausible_count;
@@ -41,17 +42,17 @@ fn wrong(field: &'static str, value: impl ToString, expected: &'static str) -> R
 
 /// Reads a flat image, colour to luminance.
 fn read(source: Source) -> Result<LoadedImage, ReadReason> {
-    let file_bytes = source.length;
+    let (file_bytes, memory) = (source.length, source.memory);
     let mut bytes = BufReader::with_capacity(1 << 16, source.bytes);
     let header = Header::read(&mut bytes)?;
     let count = plausible_count(&header.shape, file_bytes, DENSITY)?;
     let samples = match header.raster {
-        Raster::TextBits => Samples::U8(text_bits(&mut bytes, count)?),
-        Raster::Bits => Samples::U8(bits(&mut bytes, header.shape)?),
+        Raster::TextBits => Samples::U8(text_bits(&mut bytes, count, memory)?),
+        Raster::Bits => Samples::U8(bits(&mut bytes, header.shape, memory)?),
         Raster::Text => {
-            numbers(&mut TextSamples::new(bytes, header.sample_type()), &header, count)?
+            numbers(&mut TextSamples::new(bytes, header.sample_type()), &header, count, memory)?
         }
-        Raster::Bytes => numbers(&mut bytes, &header, count)?,
+        Raster::Bytes => numbers(&mut bytes, &header, count, memory)?,
     };
     Ok(AnyImage::frameless(&header.shape, samples)?.into())
 }
@@ -61,6 +62,7 @@ fn numbers(
     source: &mut dyn std::io::Read,
     header: &Header,
     count: usize,
+    memory: Memory,
 ) -> Result<Samples, ReadReason> {
     let is_text = header.raster == Raster::Text;
     let values = count.saturating_mul(header.channels);
@@ -71,6 +73,7 @@ fn numbers(
         reserve: count,
         scale: None,
         turned: None,
+        memory,
     };
     let channels = header.channels as u64;
     let read = stream::read_samples(source, &layout).map_err(|reason| match reason {
@@ -130,22 +133,31 @@ fn grey_of(bit: u8) -> u8 {
 }
 
 /// Bits in rows of whole bytes, the first the most significant.
-fn bits(source: &mut dyn BufRead, [width, height]: [usize; 2]) -> Result<Vec<u8>, ReadReason> {
-    let mut row = vec![0; width.div_ceil(8)];
+fn bits(
+    source: &mut dyn BufRead,
+    [width, height]: [usize; 2],
+    memory: Memory,
+) -> Result<Vec<u8>, ReadReason> {
+    memory.check(width as u128 * height as u128)?;
+    let mut row: Vec<u8> = memory.zeros(width.div_ceil(8))?;
     let mut samples = Vec::new();
     for y in 0..height {
         if stream::fill(source, &mut row)? < row.len() {
             let (expected, found) = ((width * height) as u64, (width * y) as u64);
             return Err(ReadReason::Truncated { expected, found });
         }
-        stream::grow(&mut samples, width, width * height)?;
+        memory.grow(&mut samples, width, width * height)?;
         samples.extend((0..width).map(|x| grey_of(row[x / 8] >> (7 - x % 8) & 1)));
     }
     Ok(samples)
 }
 
 /// Bits as digits, with blanks between them or without.
-fn text_bits(source: &mut dyn BufRead, count: usize) -> Result<Vec<u8>, ReadReason> {
+fn text_bits(
+    source: &mut dyn BufRead,
+    count: usize,
+    memory: Memory,
+) -> Result<Vec<u8>, ReadReason> {
     let mut samples = Vec::new();
     let mut byte = [0];
     while samples.len() < count {
@@ -155,7 +167,7 @@ fn text_bits(source: &mut dyn BufRead, count: usize) -> Result<Vec<u8>, ReadReas
         }
         match byte[0] {
             digit @ (b'0' | b'1') => {
-                stream::grow(&mut samples, 1, count)?;
+                memory.grow(&mut samples, 1, count)?;
                 samples.push(grey_of(digit - b'0'));
             }
             blank if header::is_blank(blank) => {}

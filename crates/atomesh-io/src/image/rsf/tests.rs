@@ -20,7 +20,7 @@ fn file(text: &str, shape: [usize; 3], encode: fn(f32) -> [u8; 4]) -> Vec<u8> {
 
 fn load(bytes: &[u8], vertical: Option<Vertical>) -> Result<LoadedImage, ReadReason> {
     let segy = SegyOptions { vertical, ..SegyOptions::default() };
-    load_bytes(bytes, FORMAT, &ReadOptions { segy, raw: None }, &mut Silent)
+    load_bytes(bytes, FORMAT, &ReadOptions { segy, ..ReadOptions::default() }, &mut Silent)
 }
 
 fn value(image: &AnyImage, index: [usize; 3]) -> f32 {
@@ -103,7 +103,10 @@ fn what_is_wrong_is_named() {
         ("n1=2 n2=2 in=stdin esize=8", "esize is 8"),
         ("n1=2 n2=2 in=stdin\x0c\x0c\x04abc", "0 of 4 samples"),
         ("n1=99999999 n2=99999999 n3=9999 in=stdin\x0c\x0c\x04", "99999999"),
-        ("n1=2 n2=2 in=stdin data_format=ascii_int\x0c\x0c\x04 1 2 three 4", "three"),
+        (
+            "n1=2 n2=2 in=stdin data_format=ascii_int\x0c\x0c\x04 1 2 three 4",
+            "number 3 of the file",
+        ),
         ("n1=2 n2=2 d2=0 in=stdin\x0c\x0c\x04abcdabcdabcdabcd", "spacing 0"),
         ("n1=2 n2=2 in=elsewhere", "\"elsewhere\""),
     ] {

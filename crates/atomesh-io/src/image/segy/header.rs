@@ -5,8 +5,8 @@ use std::io::{Read, Seek, SeekFrom};
 use super::super::error::ReadReason;
 use super::super::sample_type::ByteOrder;
 use super::super::stream;
-use super::super::traces::Number;
-use super::{FORMAT, wrong};
+use super::super::traces::SampleFormat;
+use super::wrong;
 
 /// Bytes of a textual header; the binary one follows the first.
 const TEXT: u64 = 3200;
@@ -24,11 +24,12 @@ const END: [&[u8]; 2] = [b"SEG: EndText", b"\xe2\xc5\xc7\x7a\x40\xc5\x95\x84\xe3
 pub(super) struct Header {
     pub byte_order: ByteOrder,
     /// How a sample is written.
-    pub number: Number,
+    pub format: SampleFormat,
     /// Samples of every trace.
     pub samples: usize,
-    /// The sample interval: µs, or for depths thousandths of the unit of length; none if 0.
-    pub interval: Option<f64>,
+    /// The sample interval of revision 2 and the one before: µs, or for depths thousandths of the unit of
+    /// length; 0 where it is not stated.
+    pub intervals: (f64, u16),
     /// Whether lengths are in feet.
     pub is_in_feet: bool,
     /// Bytes before the first trace.
@@ -42,21 +43,25 @@ pub(super) struct Header {
 impl Header {
     /// Bytes of a trace with its headers.
     pub fn trace_bytes(&self) -> usize {
-        self.trace_header + self.samples * self.number.size()
+        self.trace_header + self.samples * self.format.size()
     }
 
-    /// Reads the header, and the first trace's where that must help.
-    pub fn read<R: Read + Seek>(source: &mut R, file_bytes: u64) -> Result<Self, ReadReason> {
+    /// Reads the header, and the first trace's where that must help. A `given` format goes before the code's.
+    pub fn read<R: Read + Seek>(
+        source: &mut R,
+        file_bytes: u64,
+        given: Option<SampleFormat>,
+    ) -> Result<Self, ReadReason> {
         let mut bytes = [0; BINARY];
         source.seek(SeekFrom::Start(TEXT)).map_err(ReadReason::Io)?;
         if stream::fill(source, &mut bytes)? < BINARY {
             let value = format!("cut short: the file has {file_bytes} bytes");
             return Err(wrong("binary header", value, "3600 bytes of headers"));
         }
-        let byte_order = byte_order(&bytes)?;
+        let byte_order = byte_order(&bytes, given.is_some())?;
         let view = Fields { bytes: &bytes, first: 3201, byte_order };
         let major = bytes[3501 - 3201];
-        let number = number(view.i16(3225))?;
+        let format = given.map_or_else(|| format(view.i16(3225)), Ok)?;
         let start = start(source, &view, major)?;
         let extra = if major >= 2 { view.i32(3507) } else { 0 };
         let extra = usize::try_from(extra).ok().filter(|&n| n <= 100).ok_or_else(|| {
@@ -72,9 +77,9 @@ impl Header {
         let trace = Fields { bytes: &first, first: 1, byte_order };
         let mut header = Self {
             byte_order,
-            number,
+            format,
             samples: samples(&view, &trace, major)?,
-            interval: interval(&view, &trace, major),
+            intervals: (wide_interval(&view, major), view.u16(3217)),
             is_in_feet: view.i16(3255) == 2,
             start,
             trace_header: TRACE_HEADER * (1 + extra),
@@ -107,8 +112,9 @@ impl Header {
     }
 }
 
-/// Revision 2 states the byte order; before, only the format code can tell.
-fn byte_order(bytes: &[u8; BINARY]) -> Result<ByteOrder, ReadReason> {
+/// Revision 2 states the byte order; before, only the format code can tell. If the format `is_given`, a code that
+/// tells nothing leaves the usual order, most significant byte first.
+fn byte_order(bytes: &[u8; BINARY], is_given: bool) -> Result<ByteOrder, ReadReason> {
     let at = |first: usize| [bytes[first - 3201], bytes[first - 3200]];
     match bytes[3297 - 3201..3301 - 3201] {
         [1, 2, 3, 4] => return Ok(ByteOrder::Big),
@@ -117,13 +123,13 @@ fn byte_order(bytes: &[u8; BINARY]) -> Result<ByteOrder, ReadReason> {
     }
     let code = at(3225);
     let is_code = |code: u16| (1..=16).contains(&code);
-    if is_code(u16::from_be_bytes(code)) {
+    let is_little = is_code(u16::from_le_bytes(code));
+    if is_code(u16::from_be_bytes(code)) || (is_given && !is_little) {
         Ok(ByteOrder::Big)
-    } else if is_code(u16::from_le_bytes(code)) {
+    } else if is_little {
         Ok(ByteOrder::Little)
     } else {
-        let value = u16::from_be_bytes(code).to_string();
-        Err(wrong("sample format code (bytes 3225-3226)", value, "a code from 1 to 16"))
+        Err(ReadReason::TraceFormat { code: i16::from_be_bytes(code) })
     }
 }
 
@@ -174,11 +180,9 @@ fn samples(view: &Fields<'_>, trace: &Fields<'_>, major: u8) -> Result<usize, Re
     }
 }
 
-/// The sample interval: revision 2's, else the binary header's, else the first trace's.
-fn interval(view: &Fields<'_>, trace: &Fields<'_>, major: u8) -> Option<f64> {
-    let wide = if major >= 2 { f64::from_bits(view.u64(3273)) } else { 0.0 };
-    let found = [wide, view.u16(3217).into(), trace.u16(117).into()];
-    found.into_iter().find(|dt| dt.is_finite() && *dt > 0.0)
+/// The sample interval of revision 2.
+fn wide_interval(view: &Fields<'_>, major: u8) -> f64 {
+    if major >= 2 { f64::from_bits(view.u64(3273)) } else { 0.0 }
 }
 
 /// Numbers at places that are counted from `first`, as the standard counts them.
@@ -216,23 +220,17 @@ impl Fields<'_> {
 }
 
 /// The type that a format code names.
-fn number(code: i16) -> Result<Number, ReadReason> {
+fn format(code: i16) -> Result<SampleFormat, ReadReason> {
     Ok(match code {
-        1 => Number::Ibm,
-        2 => Number::I32,
-        3 => Number::I16,
-        5 => Number::F32,
-        6 => Number::F64,
-        8 => Number::I8,
-        10 => Number::U32,
-        11 => Number::U16,
-        16 => Number::U8,
-        _ => {
-            return Err(ReadReason::Unsupported {
-                format: FORMAT,
-                found: format!("samples of format code {code}"),
-                expected: "codes 1 (IBM), 5, 6 (IEEE), 2, 3, 8, 10, 11 and 16 (integers)",
-            });
-        }
+        1 => SampleFormat::Ibm,
+        2 => SampleFormat::I32,
+        3 => SampleFormat::I16,
+        5 => SampleFormat::F32,
+        6 => SampleFormat::F64,
+        8 => SampleFormat::I8,
+        10 => SampleFormat::U32,
+        11 => SampleFormat::U16,
+        16 => SampleFormat::U8,
+        _ => return Err(ReadReason::TraceFormat { code }),
     })
 }

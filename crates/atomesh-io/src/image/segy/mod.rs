@@ -4,7 +4,7 @@
 //! Barry, Cavers & Kneale 1975. Order of the work: the file's header and its size give the traces'
 //! length and number; all trace headers are read, the samples skipped; their numbers arrange the
 //! traces, their coordinates place the grid; then samples are read once, in blocks, into the vector
-//! that will hold them, missing traces being 0.
+//! that will hold them; those of missing and dead traces are 0, and told from others by a mask.
 //!
 //! Axes: in a cube x runs along the crossline numbers, y along the inline numbers; on a line x runs
 //! along the line. The last axis is the sample number, downwards. World coordinates are X and Y of
@@ -23,21 +23,30 @@ use super::any_image::AnyImage;
 use super::codec::{Codec, Source};
 use super::error::ReadReason;
 use super::format::ImageFormat;
+use super::memory::Memory;
 use super::note::{LoadedImage, ReadNote};
 use super::options::{SegyOptions, Vertical};
 use super::traces::{self, TraceLayout};
 
+mod coordinates;
+mod doubt;
 mod fit;
+mod grid;
 mod header;
+mod line;
+mod live;
 mod survey;
 #[cfg(test)]
 mod tests;
 mod trace;
+mod vertical;
 
+use coordinates::{Coordinates, nowhere};
 use fit::Placement;
 use header::Header;
 use survey::Survey;
 use trace::Trace;
+use vertical::vertical;
 
 const FORMAT: ImageFormat = ImageFormat::named("SEG-Y");
 
@@ -81,13 +90,16 @@ fn wrong(field: &'static str, value: String, expected: &'static str) -> ReadReas
 /// Reads a line or a cube.
 fn read(source: Source) -> Result<LoadedImage, ReadReason> {
     let options = &source.options.segy;
-    let Source { bytes: mut source, length: file_bytes, .. } = source;
+    let Source { bytes: mut source, length: file_bytes, memory, .. } = source;
     options.check()?;
-    let header = Header::read(&mut source, file_bytes)?;
-    let heads = trace::read_headers(&mut source, &header, options)?;
+    let header = Header::read(&mut source, file_bytes, options.sample_format)?;
+    let mut heads = trace::read_headers(&mut source, &header, options, memory)?;
     let mut notes = Vec::new();
-    let survey = Survey::arrange(&heads, options, &mut notes)?;
-    let placement = fit::place(&heads, &survey, options.coordinate_bytes(), &mut notes);
+    live::note_dead(&mut heads, &mut notes);
+    if options.sample_format.is_none() {
+        notes.extend(doubt::doubt(&mut source, &header)?);
+    }
+    let (survey, placement) = arranged(&heads, options, &mut notes)?;
     let vertical = vertical(&header, &heads, options, &mut notes);
     let length = match (placement, header.is_in_feet) {
         (None, _) => "",
@@ -103,60 +115,67 @@ fn read(source: Source) -> Result<LoadedImage, ReadReason> {
         Some(Vertical::Depth) => "m",
         None => "",
     };
-    let [nx, ny] = survey.shape;
+    let ([nx, ny], places) = (survey.shape, live::live_places(&heads, &survey));
+    let absent = live::absent(&places, survey.trace_places(), header.samples, memory)?;
     // frames are made first, so that what is wrong with them is reported before the long read
     let (image, units) = if survey.is_cube {
         let frame = cube_frame([nx, ny, header.samples], placement, vertical)?;
-        let samples = read_samples(&mut source, &header, &survey)?;
+        let samples = read_samples(&mut source, &header, &places, nx * ny, memory)?;
         (AnyImage::Volume(Image::new(frame, samples)?), vec![length, length, depth])
     } else {
         let frame = line_frame([nx, header.samples], placement, vertical)?;
-        let samples = read_samples(&mut source, &header, &survey)?;
+        let samples = read_samples(&mut source, &header, &places, nx * ny, memory)?;
         (AnyImage::Flat(Image::new(frame, samples)?), vec![length, depth])
     };
-    Ok(LoadedImage { image, units: units.into_iter().map(String::from).collect(), notes })
+    let units = units.into_iter().map(String::from).collect();
+    Ok(LoadedImage { image, units, absent, notes })
 }
 
-/// Reads the samples of all traces to their places.
-fn read_samples<R: Read + Seek>(
-    source: &mut R,
-    header: &Header,
-    survey: &Survey,
-) -> Result<Samples, ReadReason> {
-    source.seek(SeekFrom::Start(header.start)).map_err(ReadReason::Io)?;
-    let layout = TraceLayout {
-        number: header.number,
-        byte_order: header.byte_order,
-        header_bytes: header.trace_header,
-        samples: header.samples,
-        places: &survey.places,
-        plane: survey.trace_places(),
-    };
-    traces::read(source, &layout)
-}
-
-/// Spacing and origin along the last axis.
-fn vertical(
-    header: &Header,
+/// Arranges the traces, and places their grid if they have coordinates.
+fn arranged(
     traces: &[Trace],
     options: &SegyOptions,
     notes: &mut Vec<ReadNote>,
-) -> [f64; 2] {
-    let spacing = header.interval.map(|interval| {
-        let spacing = interval / 1000.0;
-        let is_known = options.vertical.is_some();
-        notes.push(ReadNote::Vertical { interval, spacing, is_known });
-        spacing
-    });
-    if spacing.is_none() {
-        notes.push(ReadNote::NoInterval);
+) -> Result<(Survey, Option<Placement>), ReadReason> {
+    let searched = options.coordinate_bytes();
+    let coordinates = Coordinates::of(traces, searched);
+    let survey = Survey::arrange(traces, options, coordinates.as_ref().ok(), notes)?;
+    let coordinates = match coordinates {
+        Ok(coordinates) => coordinates,
+        Err(note) => {
+            notes.push(note);
+            return Ok((survey, None));
+        }
+    };
+    let placement = match survey.is_cube {
+        true => fit::place(&coordinates, &survey, notes)?,
+        false => line::place(&coordinates, &survey, notes)?,
+    };
+    if placement.is_none() {
+        notes.push(nowhere(searched));
     }
-    let first = traces.first().map_or(0, |t| t.delay);
-    if let Some(trace) = traces.iter().position(|t| t.delay != first) {
-        let other = traces[trace].delay;
-        notes.push(ReadNote::Delays { first, trace: trace + 1, other });
-    }
-    [spacing.unwrap_or(1.0), first.into()]
+    Ok((survey, placement))
+}
+
+/// Reads the samples of traces to their places in a plane of `plane` traces.
+fn read_samples<R: Read + Seek>(
+    source: &mut R,
+    header: &Header,
+    places: &[usize],
+    plane: usize,
+    memory: Memory,
+) -> Result<Samples, ReadReason> {
+    source.seek(SeekFrom::Start(header.start)).map_err(ReadReason::Io)?;
+    let layout = TraceLayout {
+        format: header.format,
+        byte_order: header.byte_order,
+        header_bytes: header.trace_header,
+        samples: header.samples,
+        places,
+        plane,
+        memory,
+    };
+    traces::read(source, &layout)
 }
 
 fn line_frame(

@@ -1,8 +1,11 @@
-//! Which trace belongs where: numbers in trace headers to places on a grid.
+//! Which trace belongs where: numbers in trace headers, or else coordinates, to places on a grid.
 
 use super::super::error::ReadReason;
 use super::super::note::ReadNote;
 use super::super::options::SegyOptions;
+use super::super::traces::NOWHERE;
+use super::coordinates::Coordinates;
+use super::grid::Grid;
 use super::trace::Trace;
 
 /// The most places for each trace that is there. A survey of irregular outline fills a third of its
@@ -16,8 +19,10 @@ pub(super) struct Survey {
     pub shape: [usize; 2],
     /// Whether inlines and crosslines both vary.
     pub is_cube: bool,
-    /// The place of each trace, x + nx · y.
+    /// The place of each trace, x + nx · y; [`NOWHERE`] if a dead one has none.
     pub places: Vec<usize>,
+    /// Whether nothing but its traces' order or ensembles says that this is a line.
+    pub is_guess: bool,
 }
 
 /// Numbers that a survey counts by: from `least` on in equal steps.
@@ -77,10 +82,12 @@ impl Survey {
         self.shape[0] * self.shape[1]
     }
 
-    /// Arranges traces: by inline and crossline where both vary, else as a line.
+    /// Arranges traces: by inline and crossline where both vary, by coordinates where neither does and those
+    /// make a grid, else as a line.
     pub fn arrange(
         traces: &[Trace],
         options: &SegyOptions,
+        coordinates: Option<&Coordinates>,
         notes: &mut Vec<ReadNote>,
     ) -> Result<Self, ReadReason> {
         let numbers = |of: fn(&Trace) -> i32| Numbers::of(traces.iter().map(of));
@@ -89,16 +96,37 @@ impl Survey {
         if x.count > 1 && y.count > 1 && inline != crossline {
             return Self::cube(traces, [x, y], notes);
         }
+        let is_guess = x.count == 1 && y.count == 1 && inline != crossline;
+        if is_guess && let Some(grid) = coordinates.and_then(Grid::of) {
+            return Self::by_position(traces.len(), grid, notes);
+        }
         let mut numbered = NUMBERINGS.iter().map(|&numbering| (numbering, numbers(numbering.of)));
-        match numbered.find(|(_, numbers)| numbers.count > 1) {
-            Some((numbering, numbers)) => Self::line(traces, numbering, numbers, notes),
+        let line = match numbered.find(|(_, numbers)| numbers.count > 1) {
+            Some((numbering, numbers)) => Self::line(traces, numbering, numbers, notes)?,
             None => {
                 let numbers = "not numbered, a line in the order of the file".into();
                 notes.push(ReadNote::Traces { count: traces.len(), numbers });
                 let places = (0..traces.len()).collect();
-                Ok(Self { shape: [traces.len(), 1], is_cube: false, places })
+                Self { shape: [traces.len(), 1], is_cube: false, places, is_guess }
             }
-        }
+        };
+        Ok(Self { is_guess, ..line })
+    }
+
+    /// A grid that coordinates tell.
+    fn by_position(
+        trace_count: usize,
+        grid: Grid,
+        notes: &mut Vec<ReadNote>,
+    ) -> Result<Self, ReadReason> {
+        let shape = grid.shape;
+        notes.push(ReadNote::TracesByPosition { count: trace_count, shape });
+        let mut places = vec![NOWHERE; trace_count];
+        grid.places.iter().for_each(|&(trace, place)| places[trace] = place);
+        let name = |place: usize| {
+            format!("row {}, column {} by X and Y", place / shape[0], place % shape[0])
+        };
+        Self { shape, is_cube: true, places, is_guess: false }.checked(name, notes)
     }
 
     /// Crosslines along x, inlines along y.
@@ -117,7 +145,7 @@ impl Survey {
             format!("inline {inline}, crossline {crossline}")
         };
         let places = traces.iter().map(place).collect();
-        Self { shape, is_cube: true, places }.checked(name, notes)
+        Self { shape, is_cube: true, places, is_guess: false }.checked(name, notes)
     }
 
     /// Numbered traces along x.
@@ -137,7 +165,7 @@ impl Survey {
             format!("{singular} {}", numbers.number(place))
         };
         let places = traces.iter().map(|t| numbers.index(of(t))).collect();
-        Self { shape, is_cube: false, places }.checked(name, notes)
+        Self { shape, is_cube: false, places, is_guess: false }.checked(name, notes)
     }
 
     /// The same if no two traces have one place; says which places have none.
@@ -148,14 +176,16 @@ impl Survey {
     ) -> Result<Self, ReadReason> {
         const FREE: usize = usize::MAX;
         let mut traces = vec![FREE; self.trace_places()];
-        for (trace, &place) in self.places.iter().enumerate() {
+        for (trace, &place) in
+            self.places.iter().enumerate().filter(|(_, place)| **place != NOWHERE)
+        {
             if traces[place] != FREE {
                 let (first, second) = (traces[place] + 1, trace + 1);
                 return Err(ReadReason::DuplicateTraces { first, second, number: name(place) });
             }
             traces[place] = trace;
         }
-        let missing = traces.len() - self.places.len();
+        let missing = traces.iter().filter(|&&t| t == FREE).count();
         if let Some(first) = traces.iter().position(|&t| t == FREE) {
             let expected = traces.len();
             notes.push(ReadNote::MissingTraces { missing, expected, first: name(first) });

@@ -3,6 +3,7 @@
 use std::io::{Read, Seek, SeekFrom};
 
 use super::super::error::ReadReason;
+use super::super::memory::Memory;
 use super::super::options::SegyOptions;
 use super::super::sample_type::ByteOrder;
 use super::super::stream;
@@ -22,9 +23,18 @@ pub(super) struct Trace {
     pub scalar: i16,
     /// 2 and above: the coordinates are angles.
     pub units: i16,
-    /// The time of the first sample in milliseconds.
+    /// The time of the first sample as stored.
     pub delay: i16,
+    /// What times are multiplied by, or if negative divided by, to give milliseconds.
+    pub time_scalar: i16,
+    /// The sample interval as stored, 0 if the trace has none of its own.
+    pub interval: u16,
+    /// Whether the header says that there are no data.
+    pub is_dead: bool,
 }
+
+/// The codes of trace identification for dead traces and for dummies.
+const DEAD: [i16; 2] = [2, 3];
 
 impl Trace {
     fn parse(bytes: &[u8; TRACE_HEADER], byte_order: ByteOrder, options: &SegyOptions) -> Self {
@@ -42,26 +52,40 @@ impl Trace {
             scalar: view.i16(71),
             units: view.i16(89),
             delay: view.i16(109),
+            time_scalar: view.i16(215),
+            interval: view.u16(117),
+            is_dead: DEAD.contains(&view.i16(29)),
         }
     }
 
     /// X and Y from one of the places, in world units.
     pub fn position(&self, place: usize) -> [f64; 2] {
-        let scaled = |v: i32| match self.scalar {
-            0 => f64::from(v),
-            s @ 1.. => f64::from(v) * f64::from(s),
-            s => f64::from(v) / -f64::from(s),
-        };
-        self.places[place].map(scaled)
+        self.places[place].map(|v| scaled(v.into(), self.scalar))
+    }
+
+    /// The time of the first sample in milliseconds; as stored, if its scalar is none.
+    pub fn start(&self) -> f64 {
+        scaled(self.delay.into(), if self.has_time_scalar() { self.time_scalar } else { 1 })
+    }
+
+    /// Whether the scalar of times is one that the standard knows. Before revision 1 its bytes could hold
+    /// anything.
+    pub fn has_time_scalar(&self) -> bool {
+        [0, 1, 10, 100, 1000, 10_000].contains(&self.time_scalar.unsigned_abs())
     }
 
     /// World units from one coordinate that can be written to the next.
     pub fn resolution(&self) -> f64 {
-        match self.scalar {
-            0 => 1.0,
-            s @ 1.. => f64::from(s),
-            s => -1.0 / f64::from(s),
-        }
+        scaled(1.0, self.scalar)
+    }
+}
+
+/// A value times a scalar of the trace header; 0 stands for 1, a negative one divides.
+fn scaled(value: f64, scalar: i16) -> f64 {
+    match scalar {
+        0 => value,
+        s @ 1.. => value * f64::from(s),
+        s => value / -f64::from(s),
     }
 }
 
@@ -70,6 +94,7 @@ pub(super) fn read_headers<R: Read + Seek>(
     source: &mut R,
     header: &Header,
     options: &SegyOptions,
+    memory: Memory,
 ) -> Result<Vec<Trace>, ReadReason> {
     let mut traces = Vec::new();
     let mut bytes = [0; TRACE_HEADER];
@@ -79,7 +104,7 @@ pub(super) fn read_headers<R: Read + Seek>(
         if stream::fill(source, &mut bytes)? < bytes.len() {
             return Err(cut_short(header, k));
         }
-        stream::grow(&mut traces, 1, header.traces)?;
+        memory.grow(&mut traces, 1, header.traces)?;
         traces.push(Trace::parse(&bytes, header.byte_order, options));
     }
     Ok(traces)

@@ -1,20 +1,44 @@
 //! How samples of traces are written, IBM's floating point among them.
 
-/// The type of the samples in a file.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub(in super::super) enum Number {
+use std::fmt;
+
+/// How a sample of a trace is written.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash, serde::Serialize, serde::Deserialize)]
+#[serde(rename_all = "lowercase")]
+pub enum SampleFormat {
+    /// IBM's floating point of 32 bits.
     Ibm,
-    I32,
-    I16,
+    /// IEEE's floating point of 32 bits.
+    #[serde(rename = "ieee")]
     F32,
+    /// IEEE's floating point of 64 bits.
+    #[serde(rename = "float64")]
     F64,
+    /// A signed integer of 32 bits.
+    #[serde(rename = "int32")]
+    I32,
+    /// A signed integer of 16 bits.
+    #[serde(rename = "int16")]
+    I16,
+    /// A signed byte.
+    #[serde(rename = "int8")]
     I8,
+    /// An unsigned integer of 32 bits.
+    #[serde(rename = "uint32")]
     U32,
+    /// An unsigned integer of 16 bits.
+    #[serde(rename = "uint16")]
     U16,
+    /// An unsigned byte.
+    #[serde(rename = "uint8")]
     U8,
 }
 
-impl Number {
+impl SampleFormat {
+    /// The names by which options call them.
+    pub const NAMES: &'static [&'static str] =
+        &["ibm", "ieee", "float64", "int32", "int16", "int8", "uint32", "uint16", "uint8"];
+
     /// The bytes that a sample takes.
     pub fn size(self) -> usize {
         match self {
@@ -26,6 +50,23 @@ impl Number {
     }
 }
 
+/// IBM or IEEE, or the name of an integer's type.
+impl fmt::Display for SampleFormat {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        f.write_str(match self {
+            Self::Ibm => "IBM",
+            Self::F32 => "IEEE",
+            Self::F64 => "float64",
+            Self::I32 => "int32",
+            Self::I16 => "int16",
+            Self::I8 => "int8",
+            Self::U32 => "uint32",
+            Self::U16 => "uint16",
+            Self::U8 => "uint8",
+        })
+    }
+}
+
 /// What a fraction of 24 bits is multiplied by, for each of IBM's exponents: 16^(e − 64) / 2²⁴.
 fn ibm_scales() -> [f64; 128] {
     std::array::from_fn(|exponent| 2f64.powi(4 * (exponent as i32 - 64) - 24))
@@ -33,7 +74,7 @@ fn ibm_scales() -> [f64; 128] {
 
 /// Decodes IBM's single precision: a sign, 7 bits of exponent to 16, a fraction of 24 bits. Exact
 /// where single precision has the value; beyond its range infinite.
-pub(super) struct Ibm([f64; 128]);
+pub(in super::super) struct Ibm([f64; 128]);
 
 impl Ibm {
     pub fn new() -> Self {

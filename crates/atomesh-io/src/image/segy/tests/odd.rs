@@ -1,0 +1,313 @@
+//! Files that contradict themselves, leave gaps, or say odd things.
+
+use super::super::super::{IntervalSource, SampleFormat};
+use super::*;
+
+/// A file whose trace headers can be changed.
+struct Changed {
+    file: Vec<u8>,
+    traces: usize,
+}
+
+impl Changed {
+    fn of(writer: &Writer) -> Self {
+        Self { file: writer.bytes(), traces: writer.traces.len() }
+    }
+
+    /// The same with a number, at a byte counted from 1, in the headers of those traces that are wanted.
+    fn with<const N: usize>(
+        mut self,
+        at: usize,
+        number: [u8; N],
+        is_wanted: impl Fn(usize) -> bool,
+    ) -> Self {
+        let each = (self.file.len() - 3600) / self.traces;
+        for trace in (0..self.traces).filter(|&k| is_wanted(k)) {
+            self.file[3600 + trace * each + at - 1..][..N].copy_from_slice(&number);
+        }
+        self
+    }
+
+    fn load(&self) -> LoadedImage {
+        load(&self.file).unwrap()
+    }
+}
+
+fn load(bytes: &[u8]) -> Result<LoadedImage, ReadReason> {
+    load_bytes(bytes, FORMAT, &ReadOptions::default(), &mut Silent)
+}
+
+/// The warnings of an image, as texts.
+fn warnings(loaded: &LoadedImage) -> Vec<String> {
+    loaded.notes.iter().filter(|n| n.is_warning()).map(ReadNote::to_string).collect()
+}
+
+#[test]
+fn places_without_a_trace_are_told_from_samples_that_are_0() {
+    assert_eq!(cube(5, 7).plain().absent, None);
+    let mut some = cube(5, 7);
+    some.traces.remove(17);
+    let absent = some.plain().absent.unwrap();
+    let expected: Vec<u8> = (0..5 * 35).map(|k| u8::from(k % 35 == 17)).collect();
+    assert_eq!(absent, expected);
+}
+
+#[test]
+fn dead_traces_and_dummies_are_missing_ones() {
+    let whole = values(&cube(5, 7).plain().image);
+    for code in [2_i16, 3] {
+        let loaded = Changed::of(&cube(5, 7)).with(29, code.to_be_bytes(), |k| k % 9 == 4).load();
+        assert!(loaded.notes.contains(&ReadNote::DeadTraces { dead: 4, count: 35, first: 5 }));
+        let absent = loaded.absent.as_deref().unwrap_or_default();
+        for (k, value) in values(&loaded.image).into_iter().enumerate() {
+            let is_dead = k % 35 % 9 == 4;
+            assert_eq!((value, absent[k] == 1), (if is_dead { 0.0 } else { whole[k] }, is_dead));
+        }
+    }
+    let marked = Changed::of(&cube(5, 7)).with(29, 2_i16.to_be_bytes(), |_| true).load();
+    assert_eq!((values(&marked.image), marked.absent), (whole, None));
+    assert!(marked.notes.contains(&ReadNote::AllDead { count: 35 }));
+}
+
+#[test]
+fn a_dead_trace_is_nowhere_and_moves_no_grid() {
+    let zeros = [0; 8];
+    let dead = Changed::of(&cube(5, 7)).with(29, 2_i16.to_be_bytes(), |k| k == 20);
+    let loaded = dead.with(181, zeros, |k| k == 20).load();
+    assert!(loaded.notes.iter().all(|n| !matches!(n, ReadNote::Irregular { .. })));
+    // centimetres of the other 34 traces
+    assert!((loaded.image.spacing()[0] - 12.5).abs() < 2e-3);
+}
+
+#[test]
+fn delays_are_scaled_as_the_trace_header_says() {
+    let delayed = |scalar: i16| {
+        let changed = Changed::of(&line(4)).with(109, 1000_i16.to_be_bytes(), |_| true);
+        changed.with(215, scalar.to_be_bytes(), |_| true).load()
+    };
+    for (scalar, origin) in [(0, 1000.0), (1, 1000.0), (-10, 100.0), (-1000, 1.0), (10, 10_000.0)] {
+        assert_eq!(delayed(scalar).image.origin()[1], origin, "{scalar}");
+        assert!(warnings(&delayed(scalar)).is_empty());
+    }
+    let odd = delayed(37);
+    assert_eq!(odd.image.origin()[1], 1000.0);
+    assert!(odd.notes.contains(&ReadNote::TimeScalar { trace: 1, scalar: 37 }));
+    // without a delay there is nothing to scale, and old files have anything there
+    let nothing = Changed::of(&line(4)).with(215, 37_i16.to_be_bytes(), |_| true).load();
+    assert!(warnings(&nothing).is_empty());
+
+    let differ = Changed::of(&line(4)).with(109, 8_i16.to_be_bytes(), |k| k == 2).load();
+    assert!(differ.notes.contains(&ReadNote::Delays { first: 0.0, trace: 3, other: 8.0 }));
+}
+
+#[test]
+fn intervals_that_disagree_or_are_negative_are_told_with_the_one_taken() {
+    use IntervalSource::{BinaryHeader, FirstTrace};
+    let of_trace = |writer: Writer, interval: i16| {
+        Changed::of(&writer).with(117, interval.to_be_bytes(), |k| k > 1).load()
+    };
+    let differ = of_trace(line(5), 2000);
+    assert_eq!(differ.image.spacing()[1], 4.0);
+    assert!(differ.notes.contains(&ReadNote::IntervalsDiffer {
+        source: BinaryHeader,
+        taken: 4000.0,
+        trace: 3,
+        other: 2000.0,
+        count: 3
+    }));
+    assert!(warnings(&of_trace(line(5), 4000)).is_empty());
+    assert!(warnings(&of_trace(line(5), 0)).is_empty());
+
+    // 61536 is -4000 with a sign
+    let negative = Writer { interval: 61536, ..line(5) };
+    let mended = Changed::of(&negative).with(117, 4000_i16.to_be_bytes(), |_| true).load();
+    assert_eq!(mended.image.spacing()[1], 4.0);
+    assert!(mended.notes.contains(&ReadNote::NegativeInterval {
+        of: BinaryHeader,
+        stated: -4000.0,
+        source: FirstTrace,
+        taken: 4000.0
+    }));
+    let unsigned = negative.plain();
+    assert_eq!(unsigned.image.spacing()[1], 61.536);
+    assert_eq!(warnings(&unsigned).len(), 1);
+    assert_eq!(Writer { interval: 0, ..line(5) }.plain().image.spacing()[1], 1.0);
+}
+
+/// A bent line of the plane: y is a wave, steps of x are even.
+fn wave(count: i32) -> Writer {
+    let trace = |k: i32| {
+        let t = f64::from(k) / f64::from(count - 1);
+        let place = [5e5 + 2000.0 * t, 6e6 + 600.0 * (3.0 * t).sin()];
+        let place = place.map(|p| (100.0 * p).round() as i32);
+        Written { numbers: [0, 0], place, value: 0.0 }
+    };
+    Writer { scalar: -100, traces: (0..count).map(trace).collect(), ..Writer::default() }
+}
+
+#[test]
+fn x_of_a_crooked_line_is_the_sum_of_its_steps() {
+    let loaded = wave(101).plain();
+    // the arc's length, by many more steps than the line has; a chord's is 2001.8
+    let at = |t: f64| [2000.0 * t, 600.0 * (3.0 * t).sin()];
+    let arc: f64 = (0..100_000)
+        .map(|k| (at(f64::from(k) / 1e5), at(f64::from(k + 1) / 1e5)))
+        .map(|(a, b)| (b[0] - a[0]).hypot(b[1] - a[1]))
+        .sum();
+    // chords are shorter by their curvature, a ten thousandth here
+    assert!((loaded.image.spacing()[0] * 100.0 / arc - 1.0).abs() < 2e-4, "{arc}");
+    assert_eq!(loaded.image.origin()[0], 0.0);
+    let ends = |n: &ReadNote| match n {
+        ReadNote::CrookedLine { first, last, .. } => Some((*first, *last)),
+        _ => None,
+    };
+    let last = [502_000.0, (6e8 + 6e4 * 3f64.sin()).round() / 100.0];
+    assert_eq!(loaded.notes.iter().find_map(ends), Some(([5e5, 6e6], last)));
+    // its steps are uneven, since those of x are even
+    assert!(loaded.notes.iter().any(|n| matches!(n, ReadNote::UnevenLine { .. })));
+}
+
+#[test]
+fn rounded_coordinates_do_not_lengthen_a_line() {
+    // steps of 1.5 m, in whole metres, along a bend
+    let mut rounded = wave(1001);
+    rounded.scalar = 1;
+    for trace in &mut rounded.traces {
+        trace.place = trace.place.map(|p| (f64::from(p) / 100.0).round() as i32);
+    }
+    let (fine, coarse) = (wave(1001).plain(), rounded.plain());
+    let ratio = coarse.image.spacing()[0] / fine.image.spacing()[0];
+    assert!((ratio - 1.0).abs() < 5e-3, "{ratio}"); // half a metre across steps of ten
+}
+
+#[test]
+fn coordinates_arrange_traces_that_have_no_numbers() {
+    let numbered = cube(12, 16);
+    let mut bare = numbered.clone();
+    bare.traces.iter_mut().for_each(|t| t.numbers = [0, 0]);
+    let (bare_image, whole) = (bare.plain(), numbered.plain());
+    assert_eq!(bare_image.image.shape(), [16, 12, 5]);
+    assert_eq!(values(&bare_image.image), values(&whole.image));
+    assert_eq!(bare_image.image.spacing(), whole.image.spacing());
+    assert_eq!(bare_image.image.origin(), whole.image.origin());
+    let note = ReadNote::TracesByPosition { count: 192, shape: [16, 12] };
+    assert!(bare_image.notes.contains(&note) && warnings(&bare_image).is_empty());
+
+    // gaps, and any order behind the first two traces
+    let mut some = bare.clone();
+    some.traces.swap(5, 150);
+    some.traces.truncate(190);
+    some.traces.drain(40..47);
+    let some = some.plain();
+    assert_eq!(some.image.shape(), [16, 12, 5]);
+    let absent = some.absent.unwrap();
+    for (k, value) in values(&some.image).into_iter().enumerate() {
+        assert_eq!(value, if absent[k] == 1 { 0.0 } else { values(&whole.image)[k] });
+    }
+}
+
+#[test]
+fn a_large_grid_is_found_though_coordinates_are_rounded() {
+    // bins of 12.5 m by 25 m in whole metres: a step is known to a tenth at first
+    let mut bare = cube(150, 200);
+    bare.scalar = 1;
+    for trace in &mut bare.traces {
+        trace.numbers = [0, 0];
+        trace.place = trace.place.map(|p| (f64::from(p) / 100.0).round() as i32);
+    }
+    assert_eq!(bare.plain().image.shape(), [200, 150, 5]);
+}
+
+#[test]
+fn traces_without_numbers_that_are_no_grid_are_a_line_or_refused() {
+    let line = wave(101).plain();
+    assert_eq!(line.image.shape(), [101, 5]);
+    // rows of a grid that is bent
+    let mut bent = cube(8, 30);
+    for (k, trace) in bent.traces.iter_mut().enumerate() {
+        trace.numbers = [0, 0];
+        trace.place[0] += 3000 * (k as i32 % 7) * (k as i32 / 30);
+    }
+    let error = load(&bent.bytes()).unwrap_err();
+    assert!(matches!(error, ReadReason::NoLine { traces: 240, .. }), "{error}");
+    // unless the caller says that it is a line
+    let options = SegyOptions { trace_bytes: Some([193, 193]), ..SegyOptions::default() };
+    assert_eq!(bent.load(&options).unwrap().image.shape(), [240, 5]);
+}
+
+#[test]
+fn sheared_surveys_are_refused_with_their_angle() {
+    let (sin, cos) = 70f64.to_radians().sin_cos();
+    let mut sheared = cube(9, 9);
+    for (k, trace) in sheared.traces.iter_mut().enumerate() {
+        let (i, j) = (12.5 * (k % 9) as f64, 25.0 * (k / 9) as f64);
+        trace.place = [i + j * cos, j * sin].map(|p| (100.0 * p).round() as i32);
+    }
+    match load(&sheared.bytes()) {
+        // a centimetre over 200 m
+        Err(ReadReason::ShearedTraces { degrees }) => assert!((degrees - 70.0).abs() < 0.01),
+        other => panic!("{other:?}"),
+    }
+}
+
+#[test]
+fn a_format_that_is_given_goes_before_the_code() {
+    let called = |code: i16| {
+        let mut file = line(4).bytes();
+        file[3224..3226].copy_from_slice(&code.to_be_bytes());
+        file
+    };
+    let segy = SegyOptions { sample_format: Some(SampleFormat::F32), ..SegyOptions::default() };
+    let options = ReadOptions { segy, ..ReadOptions::default() };
+    let expected = values(&line(4).plain().image);
+    for code in [1, 0, 4, 77] {
+        let given = decode_image(&called(code), FORMAT, &options, &mut Silent).unwrap();
+        assert_eq!(values(&given), expected, "{code}");
+        if code != 1 {
+            let error = load(&called(code)).unwrap_err();
+            assert!(matches!(error, ReadReason::TraceFormat { .. }), "{error}");
+        }
+    }
+}
+
+/// Traces with 200 samples of a wave that decays, called by another code than they are written in.
+fn decaying(written: i16, called: i16) -> LoadedImage {
+    let mut writer = Writer { code: written, samples: 200, ..line(40) };
+    let count = writer.samples;
+    writer.traces.iter_mut().for_each(|t| t.value = 0.0);
+    let mut file = writer.bytes();
+    file[3224..3226].copy_from_slice(&called.to_be_bytes());
+    for (trace, bytes) in file[3600..].chunks_exact_mut(240 + 4 * count).enumerate() {
+        for (k, sample) in bytes[240..].chunks_exact_mut(4).enumerate() {
+            let t = (k + 7 * trace) as f64;
+            let value = 3e4 * (-0.02 * k as f64).exp() * (0.9 * t).sin();
+            let bits = if written == 1 { ibm(value) } else { (value as f32).to_bits() };
+            sample.copy_from_slice(&bits.to_be_bytes());
+        }
+    }
+    load(&file).unwrap()
+}
+
+#[test]
+fn samples_called_by_the_wrong_name_are_doubted_and_others_are_not() {
+    for code in [1, 5] {
+        assert!(warnings(&decaying(code, code)).is_empty(), "{code}");
+        let doubt = warnings(&decaying(code, 6 - code));
+        assert!(doubt.len() == 1 && doubt[0].contains("their bits are those of"), "{doubt:?}");
+    }
+    assert!(warnings(&Writer { code: 1, ..cube(6, 9) }.plain()).is_empty());
+}
+
+#[test]
+fn samples_whose_bits_tell_nothing_are_doubted_if_they_are_large() {
+    // values of one odd power of 2 differ from their other reading by a factor alone
+    let mut writer = Writer { samples: 20, ..line(30) };
+    for (k, trace) in writer.traces.iter_mut().enumerate() {
+        trace.value = 100_300.0 + 300.0 * k as f64;
+    }
+    let mut file = writer.bytes();
+    file[3225] = 1;
+    let loaded = load(&file).unwrap();
+    assert!(warnings(&loaded)[0].contains("may be those of IEEE numbers too"));
+    assert!(warnings(&Writer { code: 1, ..writer }.plain()).is_empty());
+}
