@@ -2,11 +2,11 @@
 
 use std::path::PathBuf;
 
-use atomesh_io::mesh::{FluxFiles, MeshFormat};
+use atomesh_io::mesh::FluxFiles;
 
 use super::options::FlowOutputOptions;
 use crate::error::JobError;
-use crate::files::{self, PictureFile, check_extension, has_extension, unknown_extension};
+use crate::files::{self, PictureFile, check_extension, has_extension};
 use crate::options::InputOptions;
 use crate::session::Session;
 
@@ -33,7 +33,7 @@ impl FlowFiles {
         check_extension(options.streamlines.as_ref(), "vtp")?;
         check_extension(options.fluxes.as_ref(), "json")?;
         if let Some(path) = &options.output {
-            MeshFormat::of(path).map_err(|_| unknown_extension(path, &MeshFormat::endings()))?;
+            files::check_holds_values(path)?;
         }
         Ok(Self {
             output: options.output.clone(),

@@ -3,9 +3,10 @@
 use std::collections::HashMap;
 use std::io::Write;
 
-use atomesh::mesh::{Mesh, Tags};
+use atomesh::mesh::Tags;
 use atomesh::watch::{Phase, Watch, check};
 
+use super::super::behind::cell_behind;
 use super::super::data::MeshData;
 use super::super::error::MeshWriteError;
 use super::super::metadata;
@@ -104,8 +105,8 @@ fn facet_groups<W: Write, const D: usize>(
         to.list(&nodes)?;
         let mut faces = vec![Vec::new(); D + 2];
         for facet in &group.facets {
-            if let Some(face) = face_behind(mesh, facet, mesh.cells_beside(facet, &cells)) {
-                faces[face.number].push(face.element);
+            if let Some(behind) = cell_behind(mesh, facet, mesh.cells_beside(facet, &cells)) {
+                faces[face_number(D, behind.opposite)].push(behind.cell + 1);
             }
         }
         let used = || faces.iter().enumerate().filter(|(_, cells)| !cells.is_empty());
@@ -119,39 +120,6 @@ fn facet_groups<W: Write, const D: usize>(
         }
     }
     Ok(())
-}
-
-/// A face of an element, both by their numbers.
-struct Face {
-    element: usize,
-    number: usize,
-}
-
-/// The face that a facet is, of the cell whose own facet there is turned alike; else of the first of the
-/// cells `beside` it.
-fn face_behind<const D: usize>(
-    mesh: &Mesh<D>,
-    facet: &[u32; D],
-    beside: impl Iterator<Item = u32>,
-) -> Option<Face> {
-    let mut first = None;
-    for cell in beside {
-        let corners = &mesh.corners()[cell as usize * (D + 1)..][..D + 1];
-        let opposite = corners.iter().position(|c| !facet.contains(c)).unwrap_or(0);
-        let face = Face { element: cell as usize + 1, number: face_number(D, opposite) };
-        if is_rotated(&mesh.facet_of(cell as usize, opposite), facet) {
-            return Some(face);
-        }
-        first = first.or(Some(face));
-    }
-    first
-}
-
-/// Whether the corners follow one another in the same order around.
-fn is_rotated<const D: usize>(a: &[u32; D], b: &[u32; D]) -> bool {
-    let shift = b.iter().position(|corner| *corner == a[0]).unwrap_or(0);
-    // an edge has its two ends in one order alone
-    if D == 2 { a == b } else { (0..D).all(|k| a[k] == b[(k + shift) % D]) }
 }
 
 /// Lines of text.
