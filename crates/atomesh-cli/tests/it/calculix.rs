@@ -67,7 +67,8 @@ impl Input {
         for &node in &self.on_sides {
             let moved = displacement(&self.nodes[node - 1], dimension);
             for (axis, value) in moved.iter().enumerate().take(dimension) {
-                writeln!(text, "{node}, {}, {}, {value:?}", axis + 1, axis + 1).unwrap();
+                // CalculiX reads 20 characters of a number
+                writeln!(text, "{node}, {}, {}, {value:.11e}", axis + 1, axis + 1).unwrap();
             }
         }
         text + "*NODE PRINT, NSET=every\nU\n*EL PRINT, ELSET=cells\nS\n*END STEP\n"

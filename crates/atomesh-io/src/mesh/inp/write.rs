@@ -19,6 +19,9 @@ const CHUNK: usize = 1 << 18;
 /// Lines between two looks at the watch.
 const LINES_PER_STEP: usize = 1 << 18;
 
+/// The most characters of a real number, in Abaqus and in CalculiX.
+const WIDTH: usize = 20;
+
 /// The most letters of a line of comment; lines may have 256.
 const COMMENT: usize = 200;
 
@@ -53,8 +56,8 @@ pub fn write_inp<const D: usize>(
     }
     to.line(format_args!("*NODE"))?;
     for (i, p) in data.nodes().iter().enumerate() {
-        let z = p.get(2).copied().unwrap_or(0.0);
-        to.line(format_args!("{}, {:?}, {:?}, {z:?}", i + 1, p[0], p[1]))?;
+        let [x, y, z] = [0, 1, 2].map(|k| number(p.get(k).copied().unwrap_or(0.0)));
+        to.line(format_args!("{}, {x}, {y}, {z}", i + 1))?;
     }
     let each = data.nodes_per_cell();
     to.line(format_args!("*ELEMENT, TYPE={}, ELSET={CELLS}", element_type(each)))?;
@@ -67,6 +70,25 @@ pub fn write_inp<const D: usize>(
         facet_groups(&mut to, data, tags)?;
     }
     to.flush()
+}
+
+/// The number in at most [`WIDTH`] characters: of more, programs read the first, and take e-12 for e-1.
+fn number(x: f64) -> String {
+    let text = format!("{x:?}");
+    if text.len() <= WIDTH {
+        return text;
+    }
+    match text.split_once('e') {
+        Some((mantissa, exponent)) => {
+            let before = mantissa.find('.').unwrap_or(mantissa.len()) + 1;
+            let digits = WIDTH - before - 1 - exponent.len();
+            format!("{x:.digits$e}")
+        }
+        None => {
+            let digits = WIDTH.saturating_sub(text.find('.').unwrap_or(text.len()) + 1);
+            format!("{x:.digits$}")
+        }
+    }
 }
 
 fn regions<W: Write, const D: usize>(
@@ -156,5 +178,27 @@ impl<W: Write> Lines<'_, W> {
         self.out.write_all(&self.bytes)?;
         self.bytes.clear();
         Ok(())
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn numbers_have_twenty_characters_at_most_and_lose_no_more_than_rounding() {
+        let digits = 1.234_567_890_123_456_7;
+        for exponent in -300..=300 {
+            for x in [digits, -digits, 9.999_999_999_999_999] {
+                let x: f64 = x * 10f64.powi(exponent);
+                let text = number(x);
+                assert!(text.len() <= WIDTH, "{text}");
+                let back: f64 = text.parse().unwrap();
+                // a sign, a point and e-300 leave twelve digits
+                assert!((back - x).abs() <= 1e-12 * x.abs(), "{text}");
+            }
+        }
+        assert_eq!(number(-1.234_567_890_123_456_7e-10), "-1.2345678901235e-10");
+        assert_eq!(number(0.1), "0.1");
     }
 }
