@@ -184,8 +184,10 @@ fn polyhedra_stand_in_the_order_of_their_number_of_points() {
     assert_eq!(sizes, cells.iter().map(|&cell| counts[cell]).collect::<Vec<_>>());
 }
 
-/// The frame of a survey, millions away from its origin.
+/// The frame of a survey, millions away from its origin, its samples a hundredth as large: coordinates have seven
+/// digits left for a sample.
 fn far<const D: usize>(frame: Frame<D>) -> Frame<D> {
+    let frame = frame.with_spacing(frame.spacing().map(|step| 0.01 * step)).unwrap();
     frame.with_origin(std::array::from_fn(|k| [431_234.5, 6_471_111.25, -2_000.0][k])).unwrap()
 }
 

@@ -70,32 +70,36 @@ pub fn read_cells(path: &Path, watch: &mut dyn Watch) -> Result<AnyCells, CellRe
 struct Place<const D: usize> {
     frame: Frame<D>,
     units: Units,
+    bounds: Bounds<D>,
+    /// How far rounding in the world may take a place off in the lattice.
+    rounding: f64,
 }
 
 impl<const D: usize> Place<D> {
     fn of(frame: Frame<D>, provenance: &Provenance) -> Self {
         let units = provenance.options.get("lattice").and_then(|lattice| lattice.get("units"));
         let units = units.and_then(|units| serde_json::from_value(units.clone()).ok());
-        Self { frame, units: units.unwrap_or_default() }
-    }
-
-    fn bounds(&self) -> Bounds<D> {
-        self.frame.grid(self.units).bounds()
+        let units = units.unwrap_or_default();
+        let grid = frame.grid(units);
+        let scale = grid.step.iter().zip(frame.spacing()).map(|(step, spacing)| step / spacing);
+        // a coordinate, the origin and D products are rounded, each by half a unit in the last place of the greatest
+        let roundings = (D + 2) as f64 * f64::EPSILON * greatest(&frame);
+        let rounding = roundings * scale.fold(0.0, f64::max);
+        Self { frame, units, bounds: grid.bounds(), rounding }
     }
 
     /// The place in the lattice, on a side of the box where rounding took it off.
     fn in_lattice(&self, world: &Point<D>) -> Point<D> {
-        on_sides(self.frame.world_to_lattice(self.units, world), &self.bounds())
+        on_sides(self.frame.world_to_lattice(self.units, world), &self.bounds, self.rounding)
     }
+}
 
-    /// How far rounding may take a place in the world, the greatest coordinate of which is given, off in the lattice.
-    fn rounding(&self, greatest: f64) -> f64 {
-        let step = self.frame.grid(self.units).step;
-        let scale = step.iter().zip(self.frame.spacing()).map(|(step, spacing)| step / spacing);
-        // a coordinate, the origin and D products are rounded, each by half a unit in the last place of the greatest
-        let roundings = (D + 2) as f64;
-        roundings * f64::EPSILON * greatest * scale.fold(0.0, f64::max)
-    }
+/// The greatest coordinate in the world, without its sign, of a corner of the box.
+fn greatest<const D: usize>(frame: &Frame<D>) -> f64 {
+    let last = frame.shape().map(|n| (n - 1) as f64);
+    let corner = |n: usize| std::array::from_fn(|k| if n >> k & 1 == 0 { 0.0 } else { last[k] });
+    let corners = (0..1 << D).map(|n| frame.lattice_to_world(Units::Samples, &corner(n)));
+    corners.flatten().fold(0.0, |most, x| most.max(x.abs()))
 }
 
 impl<const D: usize> LoadedCells<D> {
@@ -107,10 +111,7 @@ impl<const D: usize> LoadedCells<D> {
     pub fn validate(&self) -> Result<(), PolyFault> {
         let place = Place::of(self.frame, &self.provenance);
         let mesh = self.mesh.moved(self.frame.is_mirrored(), |p| place.in_lattice(p));
-        let origin = self.frame.origin();
-        let coordinates = self.mesh.points().as_flattened().iter().chain(&origin);
-        let greatest = coordinates.fold(0.0_f64, |most, x| most.max(x.abs()));
-        mesh.validate_rounded(&place.bounds(), place.rounding(greatest))
+        mesh.validate_rounded(&place.bounds, place.rounding)
     }
 }
 
@@ -131,14 +132,13 @@ fn loaded<const D: usize>(
     let mesh = match raw.faces {
         Some((points, faces)) => {
             let points: Vec<Point<D>> = points.iter().map(flat).collect();
-            let bounds = place.bounds();
             let in_lattice: Vec<Point<D>> = points.iter().map(|p| place.in_lattice(p)).collect();
-            let side_of = |corners: &[u32]| side(corners, &in_lattice, &bounds);
+            let side_of = |corners: &[u32]| side(corners, &in_lattice, &place.bounds);
             PolyMesh::new(faces.parts(points, sites, side_of)?)?
         }
         None => {
             let sites: Vec<Point<D>> = sites.iter().map(|p| place.in_lattice(p)).collect();
-            let cells = (tools.voronoi)(delaunay, &sites, place.bounds(), watch)?;
+            let cells = (tools.voronoi)(delaunay, &sites, place.bounds, watch)?;
             cells.moved(frame.is_mirrored(), |p| frame.lattice_to_world(place.units, p))
         }
     };
@@ -172,9 +172,9 @@ fn check_volumes<const D: usize>(mesh: &PolyMesh<D>, volumes: &[f64]) -> Result<
 }
 
 /// The place itself, or on a side of the box that is not further away than rounding.
-fn on_sides<const D: usize>(place: Point<D>, bounds: &Bounds<D>) -> Point<D> {
+fn on_sides<const D: usize>(place: Point<D>, bounds: &Bounds<D>, rounding: f64) -> Point<D> {
     std::array::from_fn(|k| {
-        let near = 1e-10 * (bounds.max[k] - bounds.min[k]);
+        let near = rounding.max(1e-10 * (bounds.max[k] - bounds.min[k]));
         let sides = [bounds.min[k], bounds.max[k]];
         sides.into_iter().find(|side| (place[k] - side).abs() <= near).unwrap_or(place[k])
     })
