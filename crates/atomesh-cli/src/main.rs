@@ -90,7 +90,7 @@ impl Cli {
             Command::Sample(args) => commands::sample::run(*args, &mut watch),
             Command::Export(args) => commands::export::run(&args, &mut watch),
             Command::Info(args) => commands::info::run(&args, &mut watch),
-            Command::Check(args) => commands::check::run(&args),
+            Command::Check(args) => commands::check::run(&args, &mut watch),
             Command::Synth(args) => commands::synth::run(args, &mut watch),
             Command::Completions(args) => Ok(commands::completions::run(&args, Cli::command())),
             Command::Man(args) => commands::man::run(&args, Cli::command()),

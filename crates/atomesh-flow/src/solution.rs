@@ -67,6 +67,33 @@ pub struct Solution<const D: usize> {
 }
 
 impl<const D: usize> Solution<D> {
+    /// Puts compartments that nothing drives to rest: what a scheme finds to flow there is rounding, which would be drawn
+    /// as any other flow.
+    pub(crate) fn rest(mut self, grid: &FlowGrid<D>, setting: &Setting<'_, D>) -> Self {
+        let compartments = setting.compartments();
+        let at_rest = |compartment: usize| compartments[compartment].pressure_at_rest();
+        let of_cell = |cell: u32| at_rest(setting.compartment_of()[cell as usize] as usize);
+        for (cell, (pressure, source)) in
+            self.pressures.iter_mut().zip(&mut self.sources).enumerate()
+        {
+            if let Some(rest) = of_cell(cell as u32) {
+                (*pressure, *source) = (rest, 0.0);
+            }
+        }
+        for (facet, flux) in grid.facets().iter().zip(&mut self.fluxes) {
+            if of_cell(facet.cell).is_some() {
+                *flux = 0.0;
+            }
+        }
+        for well in &mut self.wells {
+            if let Some(rest) = at_rest(well.compartment - 1) {
+                (well.rate, well.cell_pressure) = (0.0, rest);
+                well.wall_pressure = well.wall_pressure.map(|_| rest);
+            }
+        }
+        self
+    }
+
     /// The mean Darcy velocity of each cell from its fluxes, `v = Σ F_f (x_f − x_K) / |K|`, F_f outward. In simplices it is
     /// the mean of the lowest-order field with these fluxes (Raviart & Thomas 1977). Exact where the velocity is
     /// constant.

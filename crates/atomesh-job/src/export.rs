@@ -4,8 +4,7 @@ use std::path::{Path, PathBuf};
 
 use atomesh_flow::{FlowError, Problem};
 use atomesh_io::mesh::cells::{
-    AnyCells, CellData, CellReadError, ConnectionFiles, Flow, LoadedCells, ModflowFiles, Rock,
-    read_cells,
+    AnyCells, CellData, ConnectionFiles, Flow, LoadedCells, ModflowFiles, Rock, read_cells,
 };
 use atomesh_io::output_group::OutputGroup;
 
@@ -13,6 +12,7 @@ use crate::dimension::Dimension;
 use crate::error::JobError;
 use crate::files::{self, unknown_extension};
 use crate::mesh::staged_list;
+use crate::mesh_file;
 use crate::permeability;
 use crate::session::Session;
 use crate::values::BarrierSpec;
@@ -23,7 +23,7 @@ use crate::values::number_in;
 #[derive(Clone, Debug, PartialEq)]
 #[cfg_attr(feature = "clap", derive(clap::Args))]
 pub struct ExportRequest {
-    /// Voronoi cells that atomesh wrote: .vtu, or .json (a list of connections, which also names features)
+    /// Voronoi cells that atomesh wrote: .vtu, or .json (a list of connections)
     #[cfg_attr(feature = "clap", arg(value_name = "CELLS"))]
     pub cells: PathBuf,
     /// File to write: .json (connections), .disv (MODFLOW 6, polygons), .disu (MODFLOW 6, polyhedra)
@@ -131,7 +131,8 @@ pub fn export_file(
 ) -> Result<ExportSummary, JobError> {
     let format = ExportFormat::of(request)?;
     files::check_apart([request.cells.as_path()], format.paths(), session)?;
-    let read = read_cells(&request.cells, session).map_err(|e| refusal(e, &request.cells))?;
+    let read = read_cells(&request.cells, session)
+        .map_err(|e| mesh_file::cells_refusal(e, &request.cells))?;
     match (read, &format) {
         (AnyCells::Flat(_), ExportFormat::Disu(_)) => {
             let message = "holds polygons; expected a file to write that ends in .disv";
@@ -150,18 +151,6 @@ pub fn export_file(
     }
 }
 
-fn refusal(error: CellReadError, path: &Path) -> JobError {
-    match error {
-        CellReadError::Cancelled(_) => JobError::cancelled(),
-        CellReadError::Format => JobError::misuse(error),
-        CellReadError::Io { error, .. } => JobError::file(format!("cannot be read: {error}")),
-        CellReadError::Mesh(_) | CellReadError::NotVoronoi { .. } => JobError::content(error)
-            .advise("`atomesh mesh IMAGE -o CELLS.vtu --mesh voronoi` makes Voronoi cells"),
-        _ => JobError::content(error),
-    }
-    .about(path)
-}
-
 /// Cells that are exported.
 struct Export<'a, const D: usize> {
     request: &'a ExportRequest,
@@ -170,6 +159,17 @@ struct Export<'a, const D: usize> {
 }
 
 impl<const D: usize> Export<'_, D> {
+    /// MODFLOW finds no heads in cells that are sealed off from all given ones, and ends without saying which.
+    fn warn_of_compartments(&self, count: usize, session: &mut Session<'_>) {
+        if count > 1 {
+            let text = format!(
+                "sealed features part the cells into {count} compartments; MODFLOW 6 needs a given head in each, or a \
+                 share above 0, such as 1e-9"
+            );
+            session.warn(Some(&self.request.output), text);
+        }
+    }
+
     fn write(
         &self,
         dimension: &Dimension<D>,
@@ -181,8 +181,11 @@ impl<const D: usize> Export<'_, D> {
         let barriers = self.request.barrier.iter().map(|spec| spec.barrier().clone()).collect();
         let permeability = permeability::given(&self.request.permeability, fields)?;
         let problem = Problem { permeability, barriers, ..Problem::default() };
-        let about = |e: FlowError| flow_refusal(e, &self.request.cells);
+        let about = |e: FlowError| JobError::from(e).about(&self.request.cells);
         let setting = (method.setting)(&problem, &grid).map_err(about)?;
+        if !matches!(self.format, ExportFormat::Connections(_)) {
+            self.warn_of_compartments(setting.compartments().len(), session);
+        }
         let multipliers = setting.multipliers();
         let found = (method.transmissibilities)(mesh, setting.permeability(), multipliers);
         let found = found.map_err(about)?;
@@ -215,14 +218,4 @@ impl<const D: usize> Export<'_, D> {
             greatest,
         })
     }
-}
-
-fn flow_refusal(error: FlowError, cells: &Path) -> JobError {
-    let is_group = matches!(error, FlowError::Group { .. });
-    let refusal = JobError::from(error).about(cells);
-    if is_group {
-        return refusal
-            .advise("features are named in a list of connections (.json), not in a .vtu file");
-    }
-    refusal
 }

@@ -217,6 +217,22 @@ pub(crate) fn surface_format(path: &Path) -> Result<SurfaceFormat, JobError> {
     })
 }
 
+/// Refuses a mesh file that values in cells are to go into, but whose format has no place for them.
+///
+/// # Errors
+/// [`JobError`] names the formats that do.
+pub(crate) fn check_holds_values(path: &Path) -> Result<(), JobError> {
+    let format = MeshFormat::of(path);
+    let format = format.map_err(|_| unknown_extension(path, &MeshFormat::endings()))?;
+    if format.holds_values() {
+        return Ok(());
+    }
+    let known = MeshFormat::value_endings();
+    let message = format!("the format has no place for values in cells; expected one of {known}");
+    let advice = "of these, Gmsh reads .msh, and ParaView and meshio .vtu";
+    Err(JobError::misuse(message).about(path).advise(advice))
+}
+
 /// Whether a file has an extension, in upper or lower case.
 pub(crate) fn has_extension(path: &Path, wanted: &str) -> bool {
     path.extension().is_some_and(|extension| extension.eq_ignore_ascii_case(wanted))

@@ -8,7 +8,7 @@ use atomesh::measure::WantedSize;
 use atomesh::mesh::Mesh;
 use atomesh::run::MeshReport;
 use atomesh_draw::Style;
-use atomesh_io::mesh::{AnyMesh, LoadedMesh};
+use atomesh_io::mesh::LoadedMesh;
 use serde::Serialize;
 use serde_json::Value;
 
@@ -16,7 +16,7 @@ use crate::dimension::Dimension;
 use crate::error::JobError;
 use crate::files::{self, write_bytes};
 use crate::images::{Beside, ImageRole, is_z_up};
-use crate::mesh_file;
+use crate::mesh_file::{self, MeshFile};
 use crate::options::FrameOptions;
 use crate::page::{PageParts, Shown, caption, option_rows, write_page};
 use crate::session::Session;
@@ -157,9 +157,14 @@ pub fn measure_file(
 ) -> Result<MeshReport, JobError> {
     let outputs = request.json.iter().chain(&request.html);
     files::check_apart(request.inputs(), outputs.map(PathBuf::as_path), session)?;
-    match mesh_file::read(&request.mesh)? {
-        AnyMesh::Flat(mesh) => run(request, &mesh, &Dimension::plane(), session),
-        AnyMesh::Volume(mesh) => run(request, &mesh, &Dimension::space(), session),
+    match mesh_file::read(&request.mesh, session)? {
+        MeshFile::Flat(mesh) => run(request, &mesh, &Dimension::plane(), session),
+        MeshFile::Volume(mesh) => run(request, &mesh, &Dimension::space(), session),
+        MeshFile::Polygons(_) | MeshFile::Polyhedra(_) => {
+            let advice = "`atomesh mesh --mesh voronoi --report` measures them as they are made, `atomesh info` their \
+                          shape";
+            Err(mesh_file::simplices_only(&request.mesh, "a report measures", advice))
+        }
     }
 }
 

@@ -6,30 +6,93 @@ use atomesh::geometry::Bounds;
 use atomesh::image::{Frame, Units};
 use atomesh::mesh::{Mesh, Tags};
 use atomesh::run::Tools;
-use atomesh_io::mesh::{AnyMesh, MeshFormat, MeshReadError, Provenance, read_mesh};
+use atomesh::watch::Watch;
+use atomesh_io::mesh::cells::{AnyCells, CellReadError, LoadedCells, read_cells};
+use atomesh_io::mesh::{AnyMesh, LoadedMesh, MeshFormat, MeshReadError, Provenance, read_mesh};
 
 use crate::error::JobError;
+use crate::files::has_extension;
 use crate::memory;
 
-/// Reads a mesh, unless its file alone is larger than the memory available.
+/// What a mesh file holds.
+#[derive(Clone, Debug)]
+pub enum MeshFile {
+    /// Triangles.
+    Flat(LoadedMesh<2>),
+    /// Tetrahedra.
+    Volume(LoadedMesh<3>),
+    /// Voronoi cells of the plane.
+    Polygons(LoadedCells<2>),
+    /// Voronoi cells of space.
+    Polyhedra(LoadedCells<3>),
+}
+
+/// Reads a mesh of triangles or tetrahedra, or Voronoi cells that atomesh wrote (.vtu, or the head of a list of
+/// connections, .json), unless the file alone is larger than the memory available.
 ///
 /// # Errors
-/// [`JobError`] if the file cannot be read or is not what its name says.
-pub fn read(path: &Path) -> Result<AnyMesh, JobError> {
+/// [`JobError`] if the file cannot be read or is not what its name says, or the watch ends the work.
+pub fn read(path: &Path, watch: &mut dyn Watch) -> Result<MeshFile, JobError> {
     memory::check_file(path)?;
-    read_mesh(path).map_err(|e| {
-        match e {
-            MeshReadError::Format(_) => {
-                let known = MeshFormat::endings();
-                JobError::misuse(format!(
-                    "unknown extension of a mesh file; expected one of {known}"
-                ))
-            }
-            MeshReadError::Io(e) => JobError::file(format!("cannot be read: {e}")),
-            _ => JobError::content(e),
+    if is_list(path) {
+        return cells(path, watch).map_err(|e| cells_refusal(e, path));
+    }
+    match read_mesh(path) {
+        Ok(AnyMesh::Flat(mesh)) => Ok(MeshFile::Flat(mesh)),
+        Ok(AnyMesh::Volume(mesh)) => Ok(MeshFile::Volume(mesh)),
+        Err(none @ MeshReadError::NoCells { .. }) if has_extension(path, "vtu") => {
+            cells(path, watch).map_err(|e| match e {
+                CellReadError::Mesh(e) => {
+                    JobError::content(format!("{none}, and no Voronoi cells: {e}")).about(path)
+                }
+                other => cells_refusal(other, path),
+            })
         }
-        .about(path)
+        Err(e) => Err(mesh_refusal(e, path)),
+    }
+}
+
+/// Whether a file is a list of connections of Voronoi cells by its name.
+pub fn is_list(path: &Path) -> bool {
+    has_extension(path, "json")
+}
+
+fn cells(path: &Path, watch: &mut dyn Watch) -> Result<MeshFile, CellReadError> {
+    Ok(match read_cells(path, watch)? {
+        AnyCells::Flat(cells) => MeshFile::Polygons(cells),
+        AnyCells::Volume(cells) => MeshFile::Polyhedra(cells),
     })
+}
+
+fn mesh_refusal(error: MeshReadError, path: &Path) -> JobError {
+    match error {
+        MeshReadError::Format(_) => {
+            let known = MeshFormat::endings();
+            JobError::misuse(format!("unknown extension of a mesh file; expected one of {known}"))
+        }
+        MeshReadError::Io(e) => JobError::file(format!("cannot be read: {e}")),
+        _ => JobError::content(error),
+    }
+    .about(path)
+}
+
+/// The refusal of a file that should hold Voronoi cells.
+pub(crate) fn cells_refusal(error: CellReadError, path: &Path) -> JobError {
+    match error {
+        CellReadError::Cancelled(_) => JobError::cancelled(),
+        CellReadError::Format => JobError::misuse(error),
+        CellReadError::Io { error, .. } => JobError::file(format!("cannot be read: {error}")),
+        CellReadError::Mesh(_) | CellReadError::NotVoronoi { .. } => JobError::content(error)
+            .advise("`atomesh mesh IMAGE -o CELLS.vtu --mesh voronoi` makes Voronoi cells"),
+        _ => JobError::content(error),
+    }
+    .about(path)
+}
+
+/// The refusal of Voronoi cells where triangles or tetrahedra alone make sense.
+pub(crate) fn simplices_only(path: &Path, what: &str, advice: &str) -> JobError {
+    let message = format!("holds Voronoi cells; {what} triangles and tetrahedra alone");
+    JobError::misuse(message).about(path).advise(advice)
 }
 
 /// The lattice units in which a mesh was made.

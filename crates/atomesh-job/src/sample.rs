@@ -1,17 +1,21 @@
 //! Properties of cells from images.
 
-use std::path::{Path, PathBuf};
+mod sampled;
+
+pub use sampled::SampledMesh;
+
+use std::path::PathBuf;
 use std::str::FromStr;
 
 use atomesh::image::Image;
 use atomesh::sample::{SampleOptions, Statistic};
-use atomesh_io::mesh::{AnyMesh, LoadedMesh, MeshData, MeshFormat, Values};
+use atomesh_io::mesh::Values;
 
 use crate::dimension::Dimension;
 use crate::error::JobError;
-use crate::files::{self, unknown_extension};
+use crate::files;
 use crate::images::{Beside, ImageRole};
-use crate::mesh_file;
+use crate::mesh_file::{self, MeshFile};
 use crate::options::FrameOptions;
 use crate::session::Session;
 #[cfg(feature = "clap")]
@@ -21,7 +25,8 @@ use crate::values::number_in;
 #[derive(Clone, Debug, Default, PartialEq)]
 #[cfg_attr(feature = "clap", derive(clap::Args))]
 pub struct SampleRequest {
-    /// Mesh to sample in, in world coordinates: .vtu .vtk .msh .msh2 .npz
+    /// Mesh to sample in, in world coordinates: .vtu .vtk .msh .msh2 .npz .inp; or Voronoi cells that atomesh wrote: .vtu,
+    /// or .json (a list of connections)
     #[cfg_attr(feature = "clap", arg(value_name = "MESH"))]
     pub mesh: PathBuf,
     /// Image to sample, and what it is called. May be given many times. Its frame is that of the options below,
@@ -33,7 +38,7 @@ pub struct SampleRequest {
     #[cfg_attr(feature = "clap", arg(long, value_name = "STATISTIC", value_parser = statistic(),
         hide_possible_values = true))]
     pub statistic: Vec<Statistic>,
-    /// Mesh to write: .vtu .vtk .msh (Gmsh 4.1) .msh2 (Gmsh 2.2) .npz
+    /// Mesh to write: .vtu .vtk .msh (Gmsh 4.1) .msh2 (Gmsh 2.2) .npz; Voronoi cells: .vtu
     #[cfg_attr(feature = "clap", arg(short, long, value_name = "MESH"))]
     pub output: PathBuf,
     /// Value of cells without samples, where totals are 0. Default: NaN
@@ -142,14 +147,15 @@ pub struct SampleSummary {
 pub fn sample<const D: usize>(
     request: &SampleRequest,
     NamedImage { name, path }: &NamedImage,
-    loaded: &LoadedMesh<D>,
+    loaded: &impl SampledMesh<D>,
     image: &Image<D>,
     dimension: &Dimension<D>,
     session: &mut Session<'_>,
 ) -> Result<Vec<Property>, JobError> {
     let statistics = request.statistics();
     let options = SampleOptions { statistics, fill: request.outside.unwrap_or(f64::NAN) };
-    let found = (dimension.tools.sample)(&loaded.mesh, image, options, session)
+    let found = loaded
+        .sample(image, options, dimension.tools, session)
         .map_err(|e| JobError::from(e).about(path))?;
     let partial = found.partial_count();
     let mut properties = Vec::new();
@@ -165,7 +171,7 @@ pub fn sample<const D: usize>(
         });
     }
     if partial > 0 {
-        let cells = loaded.mesh.cell_count();
+        let cells = loaded.cell_count();
         let text = format!(
             "{partial} of {cells} cells have samples in a part of them only, or none; {name}-coverage says in which"
         );
@@ -183,9 +189,7 @@ pub fn sample_file(
     request: &SampleRequest,
     session: &mut Session<'_>,
 ) -> Result<SampleSummary, JobError> {
-    if MeshFormat::of(&request.output).is_err() {
-        return Err(unknown_extension(&request.output, &MeshFormat::endings()));
-    }
+    files::check_holds_values(&request.output)?;
     let names = || request.image.iter().map(|image| &image.name);
     if let Some(twice) = names().find(|name| names().filter(|other| other == name).count() > 1) {
         return Err(JobError::misuse(format!("two images are called {twice}; expected one each")));
@@ -193,59 +197,36 @@ pub fn sample_file(
     let inputs = request.image.iter().map(|image| image.path.as_path());
     let inputs = inputs.chain([request.mesh.as_path()]);
     files::check_apart(inputs, [request.output.as_path()], session)?;
-    match mesh_file::read(&request.mesh)? {
-        AnyMesh::Flat(mesh) => run(request, mesh, &Dimension::plane(), session),
-        AnyMesh::Volume(mesh) => run(request, mesh, &Dimension::space(), session),
+    match mesh_file::read(&request.mesh, session)? {
+        MeshFile::Flat(mesh) => run(request, mesh, &Dimension::plane(), session),
+        MeshFile::Volume(mesh) => run(request, mesh, &Dimension::space(), session),
+        MeshFile::Polygons(cells) => run(request, cells, &Dimension::plane(), session),
+        MeshFile::Polyhedra(cells) => run(request, cells, &Dimension::space(), session),
     }
 }
 
 fn run<const D: usize>(
     request: &SampleRequest,
-    mut loaded: LoadedMesh<D>,
+    mut loaded: impl SampledMesh<D>,
     dimension: &Dimension<D>,
     session: &mut Session<'_>,
 ) -> Result<SampleSummary, JobError> {
+    loaded.check_output(&request.output)?;
     let mut found = Vec::new();
     for named in &request.image {
-        let (frame, options) = (loaded.frame.as_ref(), &request.frame);
+        let (frame, options) = (loaded.frame(), &request.frame);
         let beside = Beside { frame, options, role: ImageRole::Property };
         let image = beside.read(&named.path, dimension, session)?;
         found.extend(sample(request, named, &loaded, &image, dimension, session)?);
     }
-    let old = std::mem::take(&mut loaded.cell_fields).into_iter();
+    let old = loaded.take_fields().into_iter();
     let old = old.filter(|field| found.iter().all(|new| new.name != field.name));
     let mut all: Vec<Property> = old.map(|f| Property::exact(f.name, f.values)).collect();
     all.extend(found);
     session.write_together(|group, session| {
         let path = files::stage(&request.output, group)?;
-        write(&path, &loaded, &all, dimension, session)
+        loaded.write(&path, &all, dimension, session)
     })?;
     let fields = all.into_iter().map(|property| property.name).collect();
-    Ok(SampleSummary { cell_count: loaded.mesh.cell_count(), fields })
-}
-
-/// Writes the mesh with its fields.
-fn write<const D: usize>(
-    path: &Path,
-    loaded: &LoadedMesh<D>,
-    properties: &[Property],
-    dimension: &Dimension<D>,
-    session: &mut Session<'_>,
-) -> Result<(), JobError> {
-    let mut data = MeshData::new(&loaded.mesh).with_tags(&loaded.tags);
-    for field in &loaded.point_fields {
-        data = data.with_point_field(&field.name, &field.values).map_err(JobError::content)?;
-    }
-    for field in properties {
-        data = data.with_cell_field(&field.name, field.values()).map_err(JobError::content)?;
-    }
-    if let Some(frame) = &loaded.frame {
-        data = data.with_frame(frame);
-    }
-    if let Some(provenance) = &loaded.provenance {
-        data = data.with_provenance(provenance);
-    }
-    let format = MeshFormat::of(path).map_err(JobError::misuse)?;
-    let written = (dimension.files.mesh)(path, format, &data, session);
-    written.map_err(|e| JobError::from(e).about(path))
+    Ok(SampleSummary { cell_count: loaded.cell_count(), fields })
 }

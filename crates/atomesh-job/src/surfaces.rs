@@ -2,14 +2,15 @@
 
 use std::path::PathBuf;
 
-use atomesh::mesh::{FacetGroup, Regions, Tags};
+use atomesh::mesh::{FacetGroup, Mesh, PolyMesh, Regions, Tags, feature_name, side_name};
 use atomesh::region::closed_surface;
-use atomesh_io::mesh::{AnyMesh, LoadedMesh};
+use atomesh_io::mesh::LoadedMesh;
+use atomesh_io::mesh::cells::LoadedCells;
 
 use crate::dimension::Dimension;
 use crate::error::JobError;
 use crate::files::{self, surface_format};
-use crate::mesh_file;
+use crate::mesh_file::{self, MeshFile};
 use crate::session::Session;
 
 /// The most names that a refusal lists.
@@ -19,7 +20,8 @@ const MOST_NAMED: usize = 8;
 #[derive(Clone, Debug, Default, PartialEq)]
 #[cfg_attr(feature = "clap", derive(clap::Args))]
 pub struct SurfacesRequest {
-    /// Mesh with tags: .vtu .msh .msh2 .inp
+    /// Mesh with tags: .vtu .msh .msh2 .inp; or Voronoi cells that atomesh wrote: .vtu, or .json (a list of
+    /// connections)
     #[cfg_attr(feature = "clap", arg(value_name = "MESH"))]
     pub mesh: PathBuf,
     /// Surfaces to write: .vtp .obj .ply; in 3-D also .stl and .ts (GOCAD), in 2-D .pl (GOCAD)
@@ -61,7 +63,7 @@ pub fn surfaces<const D: usize>(
     }
     let mut found = Vec::new();
     for name in without_repeats(&request.group) {
-        found.push(group(tags, name)?);
+        found.push(group(tags.facet_groups(), name)?);
     }
     found.extend(region_surfaces(request, loaded)?);
     Ok(found)
@@ -82,9 +84,9 @@ fn nothing<const D: usize>(tags: &Tags<D>) -> JobError {
     }
 }
 
-fn group<const D: usize>(tags: &Tags<D>, name: &str) -> Result<FacetGroup<D>, JobError> {
-    let Some(group) = tags.facet_group(name) else {
-        let known = tags.facet_groups().iter().map(|group| group.name.clone());
+fn group<const D: usize>(groups: &[FacetGroup<D>], name: &str) -> Result<FacetGroup<D>, JobError> {
+    let Some(group) = groups.iter().find(|group| group.name == name) else {
+        let known = groups.iter().map(|group| group.name.clone());
         let message = format!("no group of facets is named {name:?}; {}", known_names(known));
         return Err(JobError::misuse(message));
     };
@@ -150,26 +152,87 @@ pub fn surfaces_file(
 ) -> Result<SurfacesSummary, JobError> {
     surface_format(&request.output)?;
     files::check_apart([request.mesh.as_path()], [request.output.as_path()], session)?;
-    match mesh_file::read(&request.mesh)? {
-        AnyMesh::Flat(mesh) => run(request, &mesh, &Dimension::plane(), session),
-        AnyMesh::Volume(mesh) => run(request, &mesh, &Dimension::space(), session),
+    let about = |e: JobError| e.about(&request.mesh);
+    match mesh_file::read(&request.mesh, session)? {
+        MeshFile::Flat(loaded) => {
+            let groups = surfaces(request, &loaded).map_err(about)?;
+            write(request, &loaded.mesh, &groups, &Dimension::plane(), session)
+        }
+        MeshFile::Volume(loaded) => {
+            let groups = surfaces(request, &loaded).map_err(about)?;
+            write(request, &loaded.mesh, &groups, &Dimension::space(), session)
+        }
+        MeshFile::Polygons(loaded) => {
+            let groups = surfaces_of_cells(request, &loaded).map_err(about)?;
+            let points = points_of(&loaded.mesh).map_err(about)?;
+            write(request, &points, &groups, &Dimension::plane(), session)
+        }
+        MeshFile::Polyhedra(loaded) => {
+            let groups = surfaces_of_cells(request, &loaded).map_err(about)?;
+            let points = points_of(&loaded.mesh).map_err(about)?;
+            write(request, &points, &groups, &Dimension::space(), session)
+        }
     }
 }
 
-fn run<const D: usize>(
+/// The sides and features of Voronoi cells that a request names, or all that have faces; polygons are cut into
+/// triangles from their first points.
+///
+/// # Errors
+/// [`JobError`] if there is no such group, or the request names regions.
+fn surfaces_of_cells<const D: usize>(
     request: &SurfacesRequest,
-    loaded: &LoadedMesh<D>,
+    loaded: &LoadedCells<D>,
+) -> Result<Vec<FacetGroup<D>>, JobError> {
+    if !request.region.is_empty() {
+        return Err(JobError::misuse(
+            "Voronoi cells have no regions; expected --group, or neither",
+        ));
+    }
+    let all = groups_of_cells(loaded);
+    if request.group.is_empty() {
+        return Ok(all);
+    }
+    without_repeats(&request.group).map(|name| group(&all, name)).collect()
+}
+
+/// The sides, numbered from 1, and after them the features.
+fn groups_of_cells<const D: usize>(loaded: &LoadedCells<D>) -> Vec<FacetGroup<D>> {
+    let LoadedCells { mesh, features, .. } = loaded;
+    let side = |side: usize| FacetGroup {
+        id: side as u32 + 1,
+        name: side_name(side).to_owned(),
+        facets: mesh.side(side).flat_map(|face| mesh.face_parts(face)).collect(),
+    };
+    let mut groups: Vec<FacetGroup<D>> = (0..2 * D).map(side).collect();
+    for number in 1..=features.areas.len() as u32 {
+        let own = features.of_faces.iter().enumerate().filter(|(_, of)| **of == number);
+        let facets = own.flat_map(|(face, _)| mesh.face_parts(face)).collect();
+        groups.push(FacetGroup { id: 2 * D as u32 + number, name: feature_name(number), facets });
+    }
+    groups.retain(|group| !group.facets.is_empty());
+    groups
+}
+
+/// The points of cells, as surface files take them.
+fn points_of<const D: usize>(cells: &PolyMesh<D>) -> Result<Mesh<D>, JobError> {
+    Mesh::new(cells.points().to_vec(), Vec::new()).map_err(JobError::content)
+}
+
+fn write<const D: usize>(
+    request: &SurfacesRequest,
+    mesh: &Mesh<D>,
+    groups: &[FacetGroup<D>],
     dimension: &Dimension<D>,
     session: &mut Session<'_>,
 ) -> Result<SurfacesSummary, JobError> {
-    let SurfacesRequest { mesh, output, .. } = request;
+    let output = &request.output;
     let format = surface_format(output)?;
     format.check_dimension(D).map_err(|e| JobError::misuse(e).about(output))?;
-    let groups = surfaces(request, loaded).map_err(|e| e.about(mesh))?;
     let write = dimension.files.surface;
     session.write_together(|group, session| {
         let path = files::stage(output, group)?;
-        let written = write(&path, &loaded.mesh, &groups, None, session);
+        let written = write(&path, mesh, groups, None, session);
         written.map_err(|e| JobError::from(e).about(output))
     })?;
     let facets = groups.iter().map(|group| group.facets.len()).sum();

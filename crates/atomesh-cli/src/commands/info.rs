@@ -6,17 +6,19 @@ use std::path::PathBuf;
 use atomesh::geometry::Bounds;
 use atomesh::image::{Frame, Units};
 use atomesh::measure::{ShapeReport, shape};
+use atomesh::mesh::{PolyReport, feature_name, side_name};
 use atomesh::watch::Watch;
 use atomesh_io::image::{AnyImage, LoadedImage};
-use atomesh_io::mesh::{AnyMesh, LoadedMesh, MeshFormat, OwnedField};
+use atomesh_io::mesh::cells::LoadedCells;
+use atomesh_io::mesh::{LoadedMesh, MeshFormat, OwnedField, Provenance};
+use atomesh_job::mesh_file::{self, MeshFile};
 use atomesh_job::options::FrameOptions;
-use atomesh_job::{Dimension, JobError, images, mesh_file};
+use atomesh_job::{Dimension, JobError, images};
 
 /// Show what an image or mesh file holds
 ///
 /// Images: shape, sample type, frame, range, NaN count; of seismic data also units, and what was taken
-/// for granted about traces. Meshes: counts, box, quality, fields at the
-/// points, and the options that made them.
+/// for granted about traces. Meshes: counts, box, quality, fields, tagged facets, and the options that made them.
 #[derive(Debug, clap::Args)]
 #[command(after_help = "\
 Examples:
@@ -39,10 +41,13 @@ pub struct InfoArgs {
 /// [`JobError`] if the file cannot be read.
 pub fn run(args: &InfoArgs, watch: &mut dyn Watch) -> Result<String, JobError> {
     let options = args.frame.read_options()?;
-    if options.raw.is_none() && MeshFormat::of(&args.file).is_ok() {
-        return match &mesh_file::read(&args.file)? {
-            AnyMesh::Flat(loaded) => mesh_text(loaded, &Dimension::plane(), watch),
-            AnyMesh::Volume(loaded) => mesh_text(loaded, &Dimension::space(), watch),
+    let is_mesh = MeshFormat::of(&args.file).is_ok() || mesh_file::is_list(&args.file);
+    if options.raw.is_none() && is_mesh {
+        return match &mesh_file::read(&args.file, watch)? {
+            MeshFile::Flat(loaded) => mesh_text(loaded, &Dimension::plane(), watch),
+            MeshFile::Volume(loaded) => mesh_text(loaded, &Dimension::space(), watch),
+            MeshFile::Polygons(cells) => Ok(cells_text(cells, &Dimension::plane())),
+            MeshFile::Polyhedra(cells) => Ok(cells_text(cells, &Dimension::space())),
         }
         .map_err(|f| f.about(&args.file));
     }
@@ -143,15 +148,54 @@ fn mesh_text<const D: usize>(
         let ids = regions.ids();
         line(&mut text, "regions", listed(ids.iter().map(|&id| regions.name(id)), ids.len()));
     }
-    if let Some(frame) = &loaded.frame {
-        line(&mut text, "image", format_args!("{} samples", list(&frame.shape())));
-    }
-    if let Some(provenance) = &loaded.provenance {
-        line(&mut text, "made by", format_args!("atomesh {}", provenance.version));
-        line(&mut text, "seed", provenance.seed);
-        line(&mut text, "options", &provenance.options);
-    }
+    origin_text(&mut text, loaded.frame.as_ref(), loaded.provenance.as_ref());
     Ok(text)
+}
+
+fn cells_text<const D: usize>(cells: &LoadedCells<D>, dimension: &Dimension<D>) -> String {
+    let LoadedCells { mesh, features, fields, frame, provenance } = cells;
+    let mut text = String::new();
+    line(&mut text, "points", mesh.points().len());
+    line(&mut text, dimension.voronoi_cells, mesh.cell_count());
+    if let Some(bounds) = Bounds::of(mesh.points()) {
+        line(&mut text, "box", box_text(bounds.min, bounds.max));
+        cells_quality_text(&mut text, &(dimension.tools.cells_shape)(mesh, &bounds));
+    }
+    fields.iter().for_each(|field| field_text(&mut text, "cell field", field));
+    let side = |side| (side_name(side).to_string(), mesh.side(side).len());
+    let mut groups: Vec<(String, usize)> = (0..2 * D).map(side).collect();
+    for number in 1..=features.areas.len() as u32 {
+        let count = features.of_faces.iter().filter(|of| **of == number).count();
+        groups.push((feature_name(number), count));
+    }
+    let named = groups.iter().map(|(name, count)| format!("{name} {count}"));
+    line(&mut text, "facets", listed(named, groups.len()));
+    origin_text(&mut text, Some(frame), Some(provenance));
+    text
+}
+
+fn cells_quality_text(text: &mut String, report: &PolyReport) {
+    let (mean, most) = (report.faces_per_cell_mean, report.faces_per_cell_max);
+    line(text, "faces", format_args!("{}; mean {mean:.2} a cell, most {most}", report.faces));
+    let (least, ratio) = (report.measure_min, report.measure_ratio);
+    line(text, "sizes", format_args!("least {least:.4}, greatest over least {ratio:.2}"));
+    line(text, "cosine", format_args!("least {:.6}, of faces' normals", report.orthogonality_min));
+}
+
+/// Where a mesh lies and comes from.
+fn origin_text<const D: usize>(
+    text: &mut String,
+    frame: Option<&Frame<D>>,
+    provenance: Option<&Provenance>,
+) {
+    if let Some(frame) = frame {
+        line(text, "image", format_args!("{} samples", list(&frame.shape())));
+    }
+    if let Some(provenance) = provenance {
+        line(text, "made by", format_args!("atomesh {}", provenance.version));
+        line(text, "seed", provenance.seed);
+        line(text, "options", &provenance.options);
+    }
 }
 
 fn quality_text(text: &mut String, report: &ShapeReport) {

@@ -12,7 +12,7 @@ fn atomesh(folder: &Path, arguments: &str) -> Output {
 }
 
 /// Runs a command that must succeed, and returns what it prints.
-fn succeed(folder: &Path, arguments: &str) -> String {
+pub fn succeed(folder: &Path, arguments: &str) -> String {
     let output = atomesh(folder, arguments);
     let errors = String::from_utf8_lossy(&output.stderr);
     assert!(output.status.success(), "atomesh {arguments}: {errors}");

@@ -53,6 +53,12 @@ impl Compartment {
         self.scale > 0.0 || self.pressures[0] < self.pressures[1]
     }
 
+    /// The pressure all over it if nothing drives flow in it: that given, or 0 where none is.
+    pub fn pressure_at_rest(&self) -> Option<f64> {
+        let pressure = if self.has_pressure { self.pressures[0] } else { 0.0 };
+        (!self.is_driven()).then_some(pressure)
+    }
+
     fn is_balanced(&self) -> bool {
         self.rate.abs() <= BALANCED * self.scale
     }

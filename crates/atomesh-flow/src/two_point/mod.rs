@@ -59,5 +59,5 @@ pub fn solve<const D: usize>(
     let wells = well::couple(cells, setting)?;
     let equations = equations::Equations::new(grid, setting, inner, sides, wells);
     let (pressures, report) = equations.solve(cells.centers(), options, watch)?;
-    Ok(equations.solution(pressures, report))
+    Ok(equations.solution(pressures, report).rest(grid, setting))
 }

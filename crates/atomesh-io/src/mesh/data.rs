@@ -95,7 +95,7 @@ impl<'a, const D: usize> MeshData<'a, D> {
         Ok(self)
     }
 
-    /// The same with a vector in each cell. VTU alone holds vectors; other formats leave them out.
+    /// The same with a vector in each cell.
     ///
     /// # Errors
     /// As [`Self::with_cell_field`].

@@ -8,15 +8,25 @@ use super::provenance::Provenance;
 /// The name under which formats that name their arrays keep the text.
 pub(super) const NAME: &str = "atomesh";
 
-/// The text with the numbers by which a format that has numbers above 0 alone knows other regions.
-pub(super) fn encode_with_regions<const D: usize>(
+/// The regions and groups of facets that a file knows by other numbers: theirs, and the file's.
+#[derive(Clone, Debug, Default, PartialEq, Eq)]
+pub(super) struct KnownAs {
+    pub regions: Vec<(i32, i32)>,
+    pub groups: Vec<(u32, i32)>,
+}
+
+/// The text with the numbers by which a format knows regions and groups whose own it cannot hold.
+pub(super) fn encode_with_numbers<const D: usize>(
     frame: Option<&Frame<D>>,
     provenance: Option<&Provenance>,
-    known_as: &[(i32, i32)],
+    known_as: &KnownAs,
 ) -> String {
     let mut object = object(frame, provenance);
-    if !known_as.is_empty() {
-        object.insert("regions".into(), json!(known_as));
+    if !known_as.regions.is_empty() {
+        object.insert("regions".into(), json!(known_as.regions));
+    }
+    if !known_as.groups.is_empty() {
+        object.insert("groups".into(), json!(known_as.groups));
     }
     Value::Object(object).to_string()
 }
@@ -68,10 +78,13 @@ impl Metadata {
         self.0.is_object()
     }
 
-    /// The regions that the file knows by other numbers: theirs, and the file's.
-    pub fn regions(&self) -> Vec<(i32, i32)> {
-        let regions = self.0.get("regions").cloned().unwrap_or_default();
-        serde_json::from_value(regions).unwrap_or_default()
+    /// The regions and groups that the file knows by other numbers.
+    pub fn known_as(&self) -> KnownAs {
+        let list = |name: &str| self.0.get(name).cloned().unwrap_or_default();
+        KnownAs {
+            regions: serde_json::from_value(list("regions")).unwrap_or_default(),
+            groups: serde_json::from_value(list("groups")).unwrap_or_default(),
+        }
     }
 
     /// The provenance.

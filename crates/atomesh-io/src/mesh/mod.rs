@@ -5,6 +5,7 @@
 //! [`Provenance`]. All but VTK legacy and NPZ hold tags. The same [`MeshData`] makes the same bytes at any
 //! number of threads. `table` lists the formats.
 
+mod behind;
 mod cell_fields;
 pub mod cells;
 pub(crate) mod column;

@@ -23,6 +23,7 @@ pub(super) struct Row<const D: usize> {
     note: &'static str,
     is_folder: bool,
     holds_tags: bool,
+    holds_values: bool,
     holds_quadratic: bool,
     pub write: Writer<D>,
     pub read: Reader,
@@ -54,6 +55,7 @@ impl<const D: usize> Row<D> {
             note: "",
             is_folder: false,
             holds_tags: true,
+            holds_values: true,
             holds_quadratic: true,
             write: |path, _, data, watch| whole(path, |file| vtu::write_vtu(file, data, watch)),
             read: vtu::read_vtu,
@@ -64,6 +66,7 @@ impl<const D: usize> Row<D> {
             note: "",
             is_folder: false,
             holds_tags: false,
+            holds_values: true,
             holds_quadratic: true,
             write: |path, _, data, watch| whole(path, |file| vtk::write_vtk(file, data, watch)),
             read: vtk::read_vtk,
@@ -76,6 +79,7 @@ impl<const D: usize> Row<D> {
             note: "",
             is_folder: false,
             holds_tags: false,
+            holds_values: true,
             holds_quadratic: false,
             write: |path, _, data, watch| whole(path, |file| npz::write_npz(file, data, watch)),
             read: npz::read_npz,
@@ -86,6 +90,7 @@ impl<const D: usize> Row<D> {
             note: "Abaqus",
             is_folder: false,
             holds_tags: true,
+            holds_values: false,
             holds_quadratic: true,
             write: |path, _, data, watch| whole(path, |file| inp::write_inp(file, data, watch)),
             read: inp::read_inp,
@@ -96,6 +101,7 @@ impl<const D: usize> Row<D> {
             note: "OpenFOAM's folder",
             is_folder: true,
             holds_tags: true,
+            holds_values: false,
             holds_quadratic: false,
             write: |path, _, data, watch| {
                 openfoam::write_foam_mesh(path, &openfoam::FoamMesh::of_mesh(data)?, watch)
@@ -112,6 +118,7 @@ impl<const D: usize> Row<D> {
             note,
             is_folder: false,
             holds_tags: true,
+            holds_values: true,
             holds_quadratic: true,
             write: |path, format, data, watch| {
                 let (version, encoding) = match format {
@@ -153,6 +160,13 @@ fn rows() -> [Row<2>; 7] {
     Row::<2>::ALL
 }
 
+/// The extensions of some of the formats, for messages.
+fn endings_where(is_meant: impl Fn(&Row<2>) -> bool) -> String {
+    let rows = rows().into_iter().filter(is_meant);
+    let plain = rows.map(|row| Row { note: "", ..row }.text());
+    plain.collect::<Vec<_>>().join(", ")
+}
+
 impl MeshFormat {
     /// The format that a file's name calls for by its extension, in any case; `polyMesh` is a folder's name.
     ///
@@ -176,9 +190,12 @@ impl MeshFormat {
 
     /// The extensions of formats that hold groups of facets and regions, for messages: `.vtu, .msh, …`.
     pub fn tag_endings() -> String {
-        let rows = rows().into_iter().filter(|row| row.holds_tags);
-        let plain = rows.map(|row| Row { note: "", ..row }.text());
-        plain.collect::<Vec<_>>().join(", ")
+        endings_where(|row| row.holds_tags)
+    }
+
+    /// The extensions of formats that hold values at points and in cells, for messages: `.vtu, .vtk, …`.
+    pub fn value_endings() -> String {
+        endings_where(|row| row.holds_values)
     }
 
     /// The extensions of files that are read, for help texts: `.vtu .vtk …`.
@@ -204,6 +221,11 @@ impl MeshFormat {
         Row::<2>::of(self).holds_quadratic
     }
 
+    /// Whether the format holds values at points and in cells.
+    pub fn holds_values(self) -> bool {
+        Row::<2>::of(self).holds_values
+    }
+
     /// Whether the format holds groups of facets and regions.
     pub fn holds_tags(self) -> bool {
         Row::<2>::of(self).holds_tags
@@ -220,6 +242,7 @@ mod tests {
                    polyMesh (OpenFOAM's folder)";
         assert_eq!(MeshFormat::endings(), all);
         assert_eq!(MeshFormat::tag_endings(), ".vtu, .msh, .msh2, .inp, polyMesh");
+        assert_eq!(MeshFormat::value_endings(), ".vtu, .vtk, .msh, .msh2, .npz");
         assert_eq!(MeshFormat::read_endings(), ".vtu .vtk .msh .msh2 .npz .inp");
     }
 
@@ -230,8 +253,8 @@ mod tests {
             assert_eq!(MeshFormat::of(Path::new(&name)), Ok(row.format));
             let own = Row::<2>::of(row.format);
             assert_eq!(
-                (own.holds_tags, own.holds_quadratic),
-                (row.holds_tags, row.holds_quadratic)
+                (own.holds_tags, own.holds_values, own.holds_quadratic),
+                (row.holds_tags, row.holds_values, row.holds_quadratic)
             );
         }
         let text = MeshFormat::Msh(MshVersion::V22, MshEncoding::Text);

@@ -5,16 +5,16 @@ use std::path::Path;
 use atomesh::features::FeatureFaces;
 use atomesh::geometry::Point;
 use atomesh::image::{Frame, Units};
-use atomesh::mesh::{Delaunay, PolyMesh, connections};
+use atomesh::mesh::{Delaunay, PolyFault, PolyMesh, connections};
 use atomesh::voronoi::voronoi;
 use atomesh::watch::Silent;
 use atomesh_io::atomic_file::AtomicFile;
-use atomesh_io::mesh::Provenance;
-use atomesh_io::mesh::cells::write_cells_vtu;
 use atomesh_io::mesh::cells::{
     AnyCells, CellData, CellReadError, ConnectionFiles, Flow, LoadedCells, ModflowFiles, Rock,
     read_cells, write_connections, write_connections_with_flow, write_modflow,
 };
+use atomesh_io::mesh::cells::{write_cells_vtu, write_cells_vtu_with};
+use atomesh_io::mesh::{CellFields, Provenance};
 
 /// A frame that turns, mirrors and stretches, with sites all over its box, sides included.
 fn flat() -> (Frame<2>, PolyMesh<2>) {
@@ -101,18 +101,171 @@ fn cells_are_read_back_as_they_were_written() {
         write_vtu(&vtu, data);
         write_connections(&ConnectionFiles::of(&list), data, &mut Silent).unwrap();
     });
-    same(&read_flat(&vtu), &mesh);
+    assert_eq!(read_flat(&vtu).mesh, mesh);
     same(&read_flat(&list), &mesh);
-    assert_eq!(read_flat(&list).features.of_faces, features(&mesh).of_faces);
-    assert_eq!(read_flat(&list).frame, frame);
-    assert!(read_flat(&vtu).features.areas.is_empty(), "the VTU file does not name them");
+    for file in [&vtu, &list] {
+        assert_eq!(read_flat(file).features.of_faces, features(&mesh).of_faces);
+        assert_eq!(read_flat(file).frame, frame);
+    }
     let (frame, mesh) = volume();
     with_data(&frame, &mesh, |data| {
         write_vtu(&vtu, data);
         write_connections(&ConnectionFiles::of(&list), data, &mut Silent).unwrap();
     });
-    same(&read_volume(&vtu), &mesh);
+    assert_eq!(read_volume(&vtu).mesh, mesh);
     same(&read_volume(&list), &mesh);
+    assert_eq!(read_volume(&vtu).features.of_faces, features(&mesh).of_faces);
+}
+
+/// Numbers of each cell, none of them alike.
+fn with_fields<const D: usize>(path: &Path, frame: &Frame<D>, mesh: &PolyMesh<D>) {
+    let (single, double) = (numbers(mesh, 0.5), numbers(mesh, 1.0 / 3.0));
+    let single: Vec<f32> = single.into_iter().map(|x| x as f32).collect();
+    let vectors: Vec<Point<D>> = mesh.centers().to_vec();
+    let fields = CellFields::new(mesh.cell_count()).with_numbers("v", &single).unwrap();
+    let fields = fields.with_numbers("w", &double).unwrap();
+    let fields = fields.with_vectors("velocity", &vectors).unwrap();
+    with_data(frame, mesh, |data| {
+        let mut file = AtomicFile::create(path).unwrap();
+        write_cells_vtu_with(&mut file, data, &fields, &mut Silent).unwrap();
+        file.commit().unwrap();
+    });
+}
+
+fn numbers<const D: usize>(mesh: &PolyMesh<D>, step: f64) -> Vec<f64> {
+    (0..mesh.cell_count()).map(|cell| step * cell as f64).collect()
+}
+
+fn check_fields<const D: usize>(read: &LoadedCells<D>, mesh: &PolyMesh<D>) {
+    let names: Vec<&str> = read.fields.iter().map(|field| field.name.as_str()).collect();
+    assert_eq!(names, ["v", "w"]);
+    assert_eq!(read.fields[0].values, numbers(mesh, 0.5));
+    assert_eq!(read.fields[1].values, numbers(mesh, 1.0 / 3.0));
+}
+
+#[test]
+fn fields_of_cells_are_read_back_in_the_meshs_order() {
+    let folder = tempfile::tempdir().unwrap();
+    let path = folder.path().join("cells.vtu");
+    let (frame, mesh) = flat();
+    with_fields(&path, &frame, &mesh);
+    check_fields(&read_flat(&path), &mesh);
+    let (frame, mesh) = volume();
+    with_fields(&path, &frame, &mesh);
+    check_fields(&read_volume(&path), &mesh);
+}
+
+/// meshio puts polyhedra together by their number of points, and their data by that number ascending.
+#[test]
+fn polyhedra_stand_in_the_order_of_their_number_of_points() {
+    let folder = tempfile::tempdir().unwrap();
+    let path = folder.path().join("cells.vtu");
+    let (frame, mesh) = volume();
+    with_data(&frame, &mesh, |data| write_vtu(&path, data));
+    let points = |cell: usize| {
+        let faces = mesh.faces_of(cell);
+        let mut all: Vec<u32> = faces.flat_map(|(face, _)| mesh.face(face).to_vec()).collect();
+        all.sort_unstable();
+        all.dedup();
+        all.len()
+    };
+    let counts: Vec<usize> = (0..mesh.cell_count()).map(points).collect();
+    assert!(!counts.is_sorted(), "the mesh's own order shows nothing");
+    let file = super::cell_files::arrays(&std::fs::read(&path).unwrap());
+    let ends: Vec<usize> = super::cell_files::indices(&file["offsets"]);
+    let sizes: Vec<usize> = ends
+        .iter()
+        .enumerate()
+        .map(|(n, end)| end - if n == 0 { 0 } else { ends[n - 1] })
+        .collect();
+    assert!(sizes.is_sorted());
+    let number = |b: &[u8]| u32::from_le_bytes(b.try_into().unwrap()) as usize;
+    let cells: Vec<usize> = file["cell"].chunks_exact(4).map(number).collect();
+    assert_eq!(sizes, cells.iter().map(|&cell| counts[cell]).collect::<Vec<_>>());
+}
+
+/// The frame of a survey, millions away from its origin, its samples a hundredth as large: coordinates have seven
+/// digits left for a sample.
+fn far<const D: usize>(frame: Frame<D>) -> Frame<D> {
+    let frame = frame.with_spacing(frame.spacing().map(|step| 0.01 * step)).unwrap();
+    frame.with_origin(std::array::from_fn(|k| [431_234.5, 6_471_111.25, -2_000.0][k])).unwrap()
+}
+
+#[test]
+fn cells_as_written_are_valid_wherever_they_lie() {
+    let folder = tempfile::tempdir().unwrap();
+    let path = folder.path().join("cells.vtu");
+    for frame in [flat().0, far(flat().0)] {
+        let mesh = world(&frame, &Delaunay::<2>::new(), 40);
+        with_data(&frame, &mesh, |data| write_vtu(&path, data));
+        assert_eq!(read_flat(&path).validate(), Ok(()));
+    }
+    for frame in [volume().0, far(volume().0)] {
+        let mesh = world(&frame, &Delaunay::<3>::new(), 60);
+        with_data(&frame, &mesh, |data| write_vtu(&path, data));
+        assert_eq!(read_volume(&path).validate(), Ok(()));
+    }
+}
+
+#[test]
+fn cells_with_a_point_out_of_place_are_not_valid() {
+    let folder = tempfile::tempdir().unwrap();
+    let path = folder.path().join("cells.vtu");
+    let (frame, mesh) = volume();
+    let on_side: Vec<u32> =
+        (mesh.inner_face_count()..mesh.face_count()).flat_map(|f| mesh.face(f).to_vec()).collect();
+    let inside = mesh.corners().iter().find(|corner| !on_side.contains(corner)).unwrap();
+    let place = mesh.points()[*inside as usize];
+    let shift = |p: &Point<3>| if *p == place { [p[0] + 1e-4, p[1] + 2e-4, p[2]] } else { *p };
+    with_data(&frame, &mesh.moved(false, shift), |data| write_vtu(&path, data));
+    let fault = read_volume(&path).validate().unwrap_err();
+    assert!(matches!(fault, PolyFault::Convex { .. }), "{fault}");
+}
+
+/// A text file of unit squares in a row of two, as many as are given.
+fn squares(count: usize, volume: f64) -> String {
+    let metadata = r#"{"version":"0","seed":1,"options":{},"frame":{"shape":[3,2],"spacing":[1.0,1.0],
+        "origin":[0.0,0.0],"direction":[[1.0,0.0],[0.0,1.0]]}}"#;
+    let bytes: Vec<String> = metadata.bytes().map(|b| b.to_string()).collect();
+    let array = |kind: &str, name: &str, components: usize, text: &str| {
+        format!(
+            "<DataArray type=\"{kind}\" Name=\"{name}\" NumberOfComponents=\"{components}\" \
+             format=\"ascii\">{text}</DataArray>\n"
+        )
+    };
+    let text = |words: &[&str]| words[..count].join(" ");
+    [
+        "<VTKFile type=\"UnstructuredGrid\" version=\"1.0\" byte_order=\"LittleEndian\">\n<UnstructuredGrid>\n",
+        "<FieldData>\n",
+        &array("UInt8", "atomesh", 1, &bytes.join(" ")),
+        "</FieldData>\n",
+        &format!("<Piece NumberOfPoints=\"6\" NumberOfCells=\"{count}\">\n<CellData>\n"),
+        &array("Float64", "volume", 1, &vec![volume.to_string(); count].join(" ")),
+        &array("Float64", "site", 3, &text(&["0.5 0.5 0", "1.5 0.5 0"])),
+        "</CellData>\n<Points>\n",
+        &array("Float64", "Points", 3, "0 0 0 1 0 0 2 0 0 0 1 0 1 1 0 2 1 0"),
+        "</Points>\n<Cells>\n",
+        &array("Int64", "connectivity", 1, &text(&["0 1 4 3", "1 2 5 4"])),
+        &array("Int64", "offsets", 1, &text(&["4", "8"])),
+        &array("UInt8", "types", 1, &text(&["7", "7"])),
+        "</Cells>\n</Piece>\n</UnstructuredGrid>\n</VTKFile>\n",
+    ]
+    .concat()
+}
+
+#[test]
+fn cells_that_leave_a_gap_or_are_not_those_of_their_volumes_are_refused() {
+    let folder = tempfile::tempdir().unwrap();
+    let path = folder.path().join("cells.vtu");
+    let read = |count, volume| {
+        std::fs::write(&path, squares(count, volume)).unwrap();
+        read_cells(&path, &mut Silent).map(|_| ()).map_err(|e| e.to_string())
+    };
+    assert_eq!(read(2, 1.0), Ok(()));
+    let gap = "cell 0 has a face that is neither another cell's nor on a side of the image's box";
+    assert_eq!(read(1, 1.0), Err(gap.to_string()));
+    let volume = "cell 0 has the volume 1.5; the cell of its site has 1";
+    assert_eq!(read(2, 1.5), Err(volume.to_string()));
 }
 
 #[test]

@@ -53,7 +53,7 @@ fn with_data<const D: usize, T>(mesh: &PolyMesh<D>, use_it: impl FnOnce(&CellDat
 }
 
 /// The arrays of a VTU file by name, as bytes, by what the format says and nothing of this crate.
-fn arrays(file: &[u8]) -> HashMap<String, Vec<u8>> {
+pub fn arrays(file: &[u8]) -> HashMap<String, Vec<u8>> {
     let mark = b"<AppendedData encoding=\"raw\">\n_";
     let at = file.windows(mark.len()).position(|w| w == mark).unwrap();
     let (head, body) = (std::str::from_utf8(&file[..at]).unwrap(), &file[at + mark.len()..]);
@@ -82,7 +82,7 @@ fn reals(bytes: &[u8]) -> Vec<f64> {
     bytes.chunks_exact(8).map(|b| f64::from_le_bytes(b.try_into().unwrap())).collect()
 }
 
-fn indices(bytes: &[u8]) -> Vec<usize> {
+pub fn indices(bytes: &[u8]) -> Vec<usize> {
     bytes.chunks_exact(8).map(|b| i64::from_le_bytes(b.try_into().unwrap()) as usize).collect()
 }
 

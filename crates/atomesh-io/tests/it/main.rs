@@ -2,6 +2,7 @@
 
 mod cell_exports;
 mod cell_files;
+mod cell_values;
 mod flow_files;
 mod foam_mesh;
 mod image_bad_input;

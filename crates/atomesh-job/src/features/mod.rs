@@ -11,12 +11,12 @@ use atomesh::features::{
 use atomesh::image::{Image, Units};
 use atomesh::mesh::is_feature_name;
 use atomesh::run::MeshOptions;
-use atomesh_io::mesh::{AnyMesh, LoadedMesh};
+use atomesh_io::mesh::LoadedMesh;
 
 use crate::dimension::Dimension;
 use crate::error::JobError;
 use crate::images::{Beside, ImageRole};
-use crate::mesh_file;
+use crate::mesh_file::{self, MeshFile};
 use crate::options::{FrameOptions, PotentialOptions, RunConfig};
 use crate::session::Session;
 #[cfg(feature = "clap")]
@@ -221,9 +221,17 @@ pub fn features_file(
     session: &mut Session<'_>,
 ) -> Result<FeaturesSummary, JobError> {
     let files = FeatureFiles::new(request, session)?;
-    match mesh_file::read(&request.mesh)? {
-        AnyMesh::Flat(mesh) => run(request, &files, &mesh, &Dimension::plane(), session),
-        AnyMesh::Volume(mesh) => run(request, &files, &mesh, &Dimension::space(), session),
+    match mesh_file::read(&request.mesh, session)? {
+        MeshFile::Flat(mesh) => run(request, &files, &mesh, &Dimension::plane(), session),
+        MeshFile::Volume(mesh) => run(request, &files, &mesh, &Dimension::space(), session),
+        MeshFile::Polygons(_) | MeshFile::Polyhedra(_) => {
+            let advice = "the faces on their features were chosen when they were made; `atomesh surfaces` writes them";
+            Err(mesh_file::simplices_only(
+                &request.mesh,
+                "features are chosen among facets of",
+                advice,
+            ))
+        }
     }
 }
 

@@ -15,7 +15,7 @@ use crate::dimension::Dimension;
 use crate::error::JobError;
 use crate::files::{self, surface_format, write_bytes};
 use crate::mesh_file;
-use crate::session::Session;
+use crate::session::{Note, Session};
 
 /// Features of a mesh, to be written.
 struct Found<'a, const D: usize> {
@@ -102,8 +102,9 @@ impl<'a> FeatureFiles<'a> {
         }
         if let Some(path) = &files::stage_any(&self.request.mesh_output, group)? {
             let tags = self.tags(loaded, found, dimension.tools)?;
-            let data = tagged(loaded, &tags);
             let format = MeshFormat::of(path).map_err(JobError::misuse)?;
+            let (data, lost) = tagged(loaded, &tags);
+            note_lost(loaded, lost, path, session);
             let written = (dimension.files.mesh)(path, format, &data, session);
             written.map_err(|e| JobError::from(e).about(path))?;
         }
@@ -144,13 +145,44 @@ impl<'a> FeatureFiles<'a> {
     }
 }
 
-/// The mesh with new tags and all else that it had.
-fn tagged<'a, const D: usize>(loaded: &'a LoadedMesh<D>, tags: &'a Tags<D>) -> MeshData<'a, D> {
+/// Notes the fields of a mesh that its new file does not have: those lost, or all where the format has no place.
+fn note_lost<const D: usize>(
+    loaded: &LoadedMesh<D>,
+    mut lost: Vec<String>,
+    path: &Path,
+    session: &mut Session<'_>,
+) {
+    let at_points = loaded.point_fields.iter().map(|field| &field.name);
+    let mut all = at_points.chain(loaded.cell_fields.iter().map(|field| &field.name)).peekable();
+    let format = MeshFormat::of(path);
+    if all.peek().is_some() && !format.is_ok_and(MeshFormat::holds_values) {
+        let names = all.cloned().collect::<Vec<_>>().join(", ");
+        lost = vec![format!("the format has no place for the fields {names}")];
+    }
+    for text in lost {
+        session.note(Note { is_warning: false, file: Some(path.into()), text });
+    }
+}
+
+/// The mesh with new tags and all else that it had; and which fields it lost, since a name that another program gave may
+/// not fit every format.
+fn tagged<'a, const D: usize>(
+    loaded: &'a LoadedMesh<D>,
+    tags: &'a Tags<D>,
+) -> (MeshData<'a, D>, Vec<String>) {
     let mut data = MeshData::new(&loaded.mesh).with_tags(tags);
+    let mut lost = Vec::new();
     for field in &loaded.point_fields {
-        // a name that another program gave may not fit every format
-        let with = data.clone().with_point_field(&field.name, &field.values);
-        data = with.unwrap_or(data);
+        match data.clone().with_point_field(&field.name, &field.values) {
+            Ok(with) => data = with,
+            Err(e) => lost.push(format!("left out: {e}")),
+        }
+    }
+    for field in &loaded.cell_fields {
+        match data.clone().with_cell_field(&field.name, &field.values) {
+            Ok(with) => data = with,
+            Err(e) => lost.push(format!("left out: {e}")),
+        }
     }
     if let Some(frame) = &loaded.frame {
         data = data.with_frame(frame);
@@ -158,5 +190,5 @@ fn tagged<'a, const D: usize>(loaded: &'a LoadedMesh<D>, tags: &'a Tags<D>) -> M
     if let Some(provenance) = &loaded.provenance {
         data = data.with_provenance(provenance);
     }
-    data
+    (data, lost)
 }

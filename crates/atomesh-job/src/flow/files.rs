@@ -2,12 +2,12 @@
 
 use std::path::PathBuf;
 
-use atomesh_io::mesh::{FluxFiles, MeshFormat};
+use atomesh_io::mesh::FluxFiles;
 use atomesh_io::output_group::OutputGroup;
 
 use super::options::FlowOutputOptions;
 use crate::error::JobError;
-use crate::files::{self, PictureFile, check_extension, has_extension, unknown_extension};
+use crate::files::{self, PictureFile, check_extension, has_extension};
 use crate::options::InputOptions;
 use crate::session::Session;
 
@@ -38,7 +38,7 @@ impl FlowFiles {
             files::check_head(path)?;
         }
         if let Some(path) = &options.output {
-            MeshFormat::of(path).map_err(|_| unknown_extension(path, &MeshFormat::endings()))?;
+            files::check_holds_values(path)?;
         }
         Ok(Self {
             output: options.output.clone(),

@@ -7,16 +7,15 @@ use atomesh::image::{Frame, Image, Units};
 use atomesh::mesh::{Mesh, PolyMesh, Tags};
 use atomesh::run::{AcrossFeature, Outcome, Prepared, Tools};
 use atomesh_flow::{FlowGrid, FlowMethod};
-use atomesh_io::mesh::cells::{AnyCells, CellReadError, LoadedCells, read_cells};
-use atomesh_io::mesh::{AnyMesh, LoadedMesh, OwnedField, Provenance};
+use atomesh_io::mesh::cells::LoadedCells;
+use atomesh_io::mesh::{LoadedMesh, OwnedField, Provenance};
 
 use super::options::FlowOptions;
 use super::problem::place;
 use crate::error::JobError;
-use crate::files::has_extension;
 use crate::images::is_z_up;
 use crate::mesh::{meshed, refusal};
-use crate::mesh_file;
+use crate::mesh_file::{self, MeshFile};
 use crate::options::RunConfig;
 use crate::session::Session;
 
@@ -66,37 +65,17 @@ pub(super) enum AnyFlowMesh {
     Volume(FlowMesh<3>),
 }
 
-/// Whether a file is a list of connections of Voronoi cells by its name.
-pub(super) fn is_list(path: &Path) -> bool {
-    has_extension(path, "json")
-}
-
 /// Reads triangles or tetrahedra, or else Voronoi cells.
 ///
 /// # Errors
 /// [`JobError`] if the file holds neither.
 pub(super) fn read(path: &Path, session: &mut Session<'_>) -> Result<AnyFlowMesh, JobError> {
-    let is_list = is_list(path);
-    let simplices = match is_list {
-        false => mesh_file::read(path),
-        true => Err(JobError::misuse("no list of connections of Voronoi cells").about(path)),
-    };
-    let refusal = match simplices {
-        Ok(AnyMesh::Flat(mesh)) => {
-            return Ok(AnyFlowMesh::Flat(FlowMesh::of_mesh(mesh, Tools::plane())?));
-        }
-        Ok(AnyMesh::Volume(mesh)) => {
-            return Ok(AnyFlowMesh::Volume(FlowMesh::of_mesh(mesh, Tools::space())?));
-        }
-        Err(refusal) => refusal,
-    };
-    match read_cells(path, session) {
-        Ok(AnyCells::Flat(cells)) => Ok(AnyFlowMesh::Flat(FlowMesh::of_cells(cells))),
-        Ok(AnyCells::Volume(cells)) => Ok(AnyFlowMesh::Volume(FlowMesh::of_cells(cells))),
-        Err(CellReadError::Cancelled(_)) => Err(JobError::cancelled()),
-        Err(e) if is_list => Err(JobError::content(e).about(path)),
-        Err(_) => Err(refusal),
-    }
+    Ok(match mesh_file::read(path, session)? {
+        MeshFile::Flat(mesh) => AnyFlowMesh::Flat(FlowMesh::of_mesh(mesh, Tools::plane())?),
+        MeshFile::Volume(mesh) => AnyFlowMesh::Volume(FlowMesh::of_mesh(mesh, Tools::space())?),
+        MeshFile::Polygons(cells) => AnyFlowMesh::Flat(FlowMesh::of_cells(cells)),
+        MeshFile::Polyhedra(cells) => AnyFlowMesh::Volume(FlowMesh::of_cells(cells)),
+    })
 }
 
 impl<const D: usize> FlowMesh<D> {

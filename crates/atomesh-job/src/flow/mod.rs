@@ -31,6 +31,7 @@ use crate::error::JobError;
 use crate::images;
 use crate::memory;
 use crate::mesh::{MeshImages, prepare, shown};
+use crate::mesh_file;
 use crate::options::{
     FrameOptions, ImprovementOptions, InputOptions, LatticeOptions, OptimizerOptions,
     OutputOptions, PotentialOptions, RegionOptions, RunConfig,
@@ -225,7 +226,7 @@ pub fn flow_file(request: FlowRequest, session: &mut Session<'_>) -> Result<Flow
     run.take_labels_alone();
     let path = shown(&run)?.to_path_buf();
     let is_image = ImageFormat::of(&path).is_some() || run.frame.shape.is_some();
-    if !is_image && (flow_mesh::is_list(&path) || MeshFormat::of(&path).is_ok()) {
+    if !is_image && (mesh_file::is_list(&path) || MeshFormat::of(&path).is_ok()) {
         refuse_mesh_options(&run)?;
         let work = FileRun { run: &run, options: &options, files: &files };
         return match flow_mesh::read(&path, session)? {

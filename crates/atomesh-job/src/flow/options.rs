@@ -135,7 +135,7 @@ impl FlowOptions {
 #[cfg_attr(feature = "clap", derive(clap::Args))]
 pub struct FlowOutputOptions {
     /// Mesh with pressure, velocity, permeability and mean time of flight from the inflow (NaN where nothing comes)
-    /// of each cell: .vtu; triangles and tetrahedra also .msh .msh2 .vtk .npz, without velocity
+    /// of each cell: .vtu; triangles and tetrahedra also .msh .msh2 .vtk .npz
     #[cfg_attr(feature = "clap", arg(short, long, value_name = "MESH"))]
     pub output: Option<PathBuf>,
     /// Pressure as the scheme has it, with its jumps: a .vtu whose points are repeated for each cell

@@ -3,7 +3,7 @@
 use std::path::Path;
 
 use atomesh_io::mesh::MeshFormat;
-use atomesh_io::mesh::msh::MshVersion;
+use atomesh_io::mesh::msh::{MshEncoding, MshVersion};
 
 use crate::error::JobError;
 use crate::files::unknown_extension;
@@ -19,9 +19,18 @@ pub(super) enum OutputFormat {
     VoronoiFoam,
 }
 
+/// What is wanted of Gmsh's format.
+#[derive(Clone, Copy, Debug, Default)]
+pub(super) struct MshWish<'a> {
+    /// The version, where not that of the file's name.
+    pub version: Option<&'a str>,
+    /// Whether numbers are text.
+    pub is_text: bool,
+}
+
 impl OutputFormat {
-    /// The format that a path calls for; `msh` is the version wanted of Gmsh's.
-    pub fn of(mesh: &Path, is_voronoi: bool, msh: Option<&str>) -> Result<Self, JobError> {
+    /// The format that a path calls for.
+    pub fn of(mesh: &Path, is_voronoi: bool, msh: MshWish<'_>) -> Result<Self, JobError> {
         let format = MeshFormat::of(mesh);
         if is_voronoi {
             return match format {
@@ -35,12 +44,18 @@ impl OutputFormat {
             };
         }
         let format = format.map_err(|_| unknown_extension(mesh, &MeshFormat::endings()))?;
-        let Some(version) = msh else { return Ok(Self::Simplices(format)) };
+        let MshWish { version, is_text } = msh;
         match format {
-            MeshFormat::Msh(_, encoding) => {
-                Ok(Self::Simplices(MeshFormat::Msh(msh_version(version)?, encoding)))
+            MeshFormat::Msh(own, encoding) => {
+                let version = version.map_or(Ok(own), msh_version)?;
+                let encoding = if is_text { MshEncoding::Text } else { encoding };
+                Ok(Self::Simplices(MeshFormat::Msh(version, encoding)))
             }
-            _ => Err(JobError::misuse("--msh is for .msh files").about(mesh)),
+            _ if version.is_some() => Err(JobError::misuse("--msh is for .msh files").about(mesh)),
+            _ if is_text => {
+                Err(JobError::misuse("--msh-text is for .msh and .msh2 files").about(mesh))
+            }
+            _ => Ok(Self::Simplices(format)),
         }
     }
 

@@ -5,7 +5,7 @@ use std::path::{Path, PathBuf};
 use atomesh_io::mesh::cells::ConnectionFiles;
 use atomesh_io::output_group::OutputGroup;
 
-use super::format::OutputFormat;
+use super::format::{MshWish, OutputFormat};
 use crate::error::JobError;
 use crate::files::{self, PictureFile, has_extension, unknown_extension};
 use crate::options::{Backdrop, OutputOptions, RunConfig};
@@ -47,7 +47,9 @@ impl Outputs {
             check_names(run)?;
         }
         let is_voronoi = run.is_voronoi();
-        let format = OutputFormat::of(&mesh, is_voronoi, options.msh.as_deref())?;
+        let msh =
+            MshWish { version: options.msh.as_deref(), is_text: options.msh_text == Some(true) };
+        let format = OutputFormat::of(&mesh, is_voronoi, msh)?;
         let connections = connections(options, is_voronoi)?;
         let picture = PictureFile::of(options.picture.as_ref())?;
         if let Some(path) = &options.write_potential {

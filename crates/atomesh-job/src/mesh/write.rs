@@ -1,5 +1,6 @@
 //! Writing a mesh and what is written with it.
 
+use std::fmt::Display;
 use std::path::Path;
 
 use atomesh::features::FeatureFacetOptions;
@@ -101,11 +102,7 @@ impl<const D: usize> Writing<'_, D> {
         let outcome = self.outcome;
         let mesh = outcome.world_mesh();
         // no mesh leaves that is none, whatever went wrong before
-        mesh.validate().map_err(|fault| {
-            JobError::content(format!("the mesh would not be valid: {fault}"))
-                .advise("this is a fault of atomesh's own; another --size or --seed may avoid it")
-                .about_any(self.run.input.shown())
-        })?;
+        mesh.validate().map_err(|fault| self.not_valid(fault))?;
         let quadratic = self.outputs.is_quadratic.then(|| outcome.quadratic());
         let at_nodes = |values: &[f32]| match &quadratic {
             Some(quadratic) => quadratic.extend(values),
@@ -132,6 +129,12 @@ impl<const D: usize> Writing<'_, D> {
         let written = (self.dimension.files.mesh)(&self.outputs.mesh, format, &data, session);
         written.map_err(|e| JobError::from(e).about(&self.outputs.mesh))?;
         Ok(tagged)
+    }
+
+    fn not_valid(&self, fault: impl Display) -> JobError {
+        JobError::content(format!("the mesh would not be valid: {fault}"))
+            .advise("this is a fault of atomesh's own; another --size or --seed may avoid it")
+            .about_any(self.run.input.shown())
     }
 
     /// The sides of the box, outline and labels, and the features if they are asked for.
@@ -163,14 +166,13 @@ impl<const D: usize> Writing<'_, D> {
         session: &mut Session<'_>,
     ) -> Result<(), JobError> {
         let (outputs, path) = (self.outputs, &self.outputs.mesh);
-        let Some(mesh) = self.outcome.world_cells() else {
+        let (Some(cells), Some(mesh)) = (self.outcome.cells(), self.outcome.world_cells()) else {
             return Err(JobError::content("the run made no Voronoi cells"));
         };
+        let bounds = self.outcome.potential().grid().bounds();
+        cells.validate(&bounds).map_err(|fault| self.not_valid(fault))?;
         let is_foam = outputs.format == OutputFormat::VoronoiFoam;
-        // the VTU file does not name them
-        let names_features = outputs.connections.is_some() || is_foam;
-        let features = names_features.then(|| self.outcome.cell_features()).flatten();
-        let features = features.unwrap_or_default();
+        let features = self.outcome.cell_features().unwrap_or_default();
         let frame = self.outcome.frame();
         let data = CellData { mesh: &mesh, features: &features, frame, provenance };
         let files = &self.dimension.files;

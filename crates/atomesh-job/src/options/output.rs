@@ -33,6 +33,10 @@ section! {
         /// Version of Gmsh's format in a .msh file. Default: 4.1
         #[arg(long, value_name = "VERSION", value_parser = ["4.1", "2.2"])]
         pub msh: String,
+        /// Write a .msh or .msh2 file as text, which Netgen and GetFEM need. Default: binary
+        #[arg(long, value_name = "BOOL", num_args = 0..=1, require_equals = true,
+            default_missing_value = "true")]
+        pub msh_text: bool,
         /// Order of the cells: 2 writes triangles of 6 and tetrahedra of 10 points, curved on a mask's
         /// outline. Default: 1
         #[arg(long, value_name = "ORDER", value_parser = clap::value_parser!(u8).range(1..=2))]

@@ -107,3 +107,33 @@ fn across_a_sealed_slit_the_pressure_jumps() {
     assert!(errors.windows(2).all(|pair| pair[1] < 0.75 * pair[0]), "{errors:?}");
     assert!(errors[2] < 0.02, "{errors:?}");
 }
+
+#[test]
+fn nothing_flows_at_all_in_compartments_that_nothing_drives() {
+    let bounds = cube::<2>(1.0);
+    let cells = cells_of(&scattered::<2>(200, 3), bounds);
+    let mut grid = FlowGrid::of_cells(&cells, None);
+    let centers = cells.centers().to_vec();
+    let is_left = |cell: u32| centers[cell as usize][0] < 0.5;
+    name_faces(&mut grid, "wall", |f| is_left(f.cell) != f.neighbour.is_none_or(is_left));
+    let problem = Problem {
+        boundaries: vec![pressure_on("xmin", 0.1), pressure_on("xmax", 0.7)],
+        barriers: vec![Barrier { group: "wall".to_string(), multiplier: 0.0 }],
+        ..Problem::default()
+    };
+    let found = answer(&cells, &grid, &problem);
+    assert!(found.fluxes.iter().all(|flux| *flux == 0.0), "rounding is no flow");
+    assert!(found.velocities(&grid).as_flattened().iter().all(|v| *v == 0.0));
+    let expected = |cell| if is_left(cell) { 0.1 } else { 0.7 };
+    let pressures = found.pressures.iter().zip(0..);
+    assert!(pressures.into_iter().all(|(pressure, cell)| *pressure == expected(cell)));
+    // one side driven, the other not
+    let driven =
+        Problem { wells: vec![well([0.9, 0.4], Control::Rate(1.0), None)], ..problem.clone() };
+    let found = answer(&cells, &grid, &driven);
+    let rest = found.velocities(&grid);
+    let moves = |cell: &u32| rest[*cell as usize].iter().any(|v| *v != 0.0);
+    let count = centers.len() as u32;
+    assert!((0..count).filter(moves).all(|cell| !is_left(cell)));
+    assert!((0..count).filter(moves).count() > 20);
+}

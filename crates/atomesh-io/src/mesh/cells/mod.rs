@@ -10,6 +10,7 @@ mod raw;
 mod read;
 mod read_vtu;
 mod table;
+mod topology;
 mod vtu;
 
 pub use connections::{ConnectionFiles, Flow, write_connections, write_connections_with_flow};

@@ -5,12 +5,14 @@ use std::io;
 use std::path::Path;
 
 use atomesh::geometry::Point;
+use atomesh::mesh::PolyFault;
 use atomesh::voronoi::VoronoiError;
 use atomesh::watch::Cancelled;
 
 use super::super::field::OwnedField;
 use super::super::metadata::Metadata;
 use super::super::read_error::MeshReadError;
+use super::topology::CellFaces;
 
 /// Why Voronoi cells were not read.
 #[derive(Debug, thiserror::Error)]
@@ -61,6 +63,23 @@ pub enum CellReadError {
         /// That of the Voronoi cell.
         expected: f64,
     },
+    /// The cells of a file do not make a mesh.
+    #[error(transparent)]
+    Fault(#[from] PolyFault),
+    /// A face that two other cells have, or that its own cell has twice.
+    #[error("cell {cell} has a face that two cells before it have, or has it twice")]
+    Crowded {
+        /// The cell.
+        cell: usize,
+    },
+    /// A cell ends where there is no other.
+    #[error(
+        "cell {cell} has a face that is neither another cell's nor on a side of the image's box"
+    )]
+    Border {
+        /// The cell.
+        cell: usize,
+    },
     /// The watch ended the work.
     #[error(transparent)]
     Cancelled(#[from] Cancelled),
@@ -82,6 +101,8 @@ pub(super) struct RawCells {
     /// Padded by 0 in the plane.
     pub sites: Vec<Point<3>>,
     pub volumes: Vec<f64>,
+    /// The points, padded like sites, and the cells' faces, where the file has them.
+    pub faces: Option<(Vec<Point<3>>, CellFaces)>,
     pub fields: Vec<OwnedField<f64>>,
     /// The feature of each face between two cells that lies on one, from 1 on.
     pub features: BTreeMap<(u32, u32), u32>,

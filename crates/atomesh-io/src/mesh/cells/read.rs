@@ -1,9 +1,9 @@
 //! Reading Voronoi cells that atomesh wrote: VTU, or the list of connections.
 //!
-//! Both files name the sites, and Voronoi cells are made by their sites and their box, which the frame gives. So
-//! cells are not pieced together from the file's faces, but made again, and their volumes are compared with the
-//! file's: what is returned is what was written, or an error says which cell is not. The list also says which
-//! faces lie on features.
+//! A VTU file has the points and faces of its cells, and these are the mesh's; the volumes that it names must be theirs.
+//! A list of connections has none. It names the sites, and Voronoi cells are made by their sites and their box,
+//! which the frame gives: they are made again, and their volumes compared with the list's. Either way what is returned is
+//! what was written, or an error says which cell is not.
 
 use std::collections::BTreeMap;
 use std::path::Path;
@@ -11,7 +11,7 @@ use std::path::Path;
 use atomesh::features::FeatureFaces;
 use atomesh::geometry::{Bounds, Point};
 use atomesh::image::{Frame, Units};
-use atomesh::mesh::{Delaunay, PolyMesh};
+use atomesh::mesh::{Delaunay, PolyFault, PolyMesh};
 use atomesh::run::Tools;
 use atomesh::watch::Watch;
 
@@ -27,7 +27,7 @@ const SAME_VOLUME: f64 = 1e-8;
 /// Voronoi cells as read from a file.
 #[derive(Clone, Debug)]
 pub struct LoadedCells<const D: usize> {
-    /// The cells, in world coordinates, in the file's order.
+    /// The cells, in world coordinates, in the order in which they were made.
     pub mesh: PolyMesh<D>,
     /// Which faces lie on features; none where the file does not say it.
     pub features: FeatureFaces,
@@ -60,14 +60,63 @@ pub fn read_cells(path: &Path, watch: &mut dyn Watch) -> Result<AnyCells, CellRe
         _ => return Err(CellReadError::Format),
     };
     if raw.dimension == 2 {
-        Ok(AnyCells::Flat(rebuild(&Delaunay::<2>::new(), Tools::plane(), raw, watch)?))
+        Ok(AnyCells::Flat(loaded(&Delaunay::<2>::new(), Tools::plane(), raw, watch)?))
     } else {
-        Ok(AnyCells::Volume(rebuild(&Delaunay::<3>::new(), Tools::space(), raw, watch)?))
+        Ok(AnyCells::Volume(loaded(&Delaunay::<3>::new(), Tools::space(), raw, watch)?))
     }
 }
 
-/// The cells of the sites, in the box of the frame.
-fn rebuild<const D: usize>(
+/// Where cells lie: the image's frame, and its box in the lattice's units.
+struct Place<const D: usize> {
+    frame: Frame<D>,
+    units: Units,
+    bounds: Bounds<D>,
+    /// How far rounding in the world may take a place off in the lattice.
+    rounding: f64,
+}
+
+impl<const D: usize> Place<D> {
+    fn of(frame: Frame<D>, provenance: &Provenance) -> Self {
+        let units = provenance.options.get("lattice").and_then(|lattice| lattice.get("units"));
+        let units = units.and_then(|units| serde_json::from_value(units.clone()).ok());
+        let units = units.unwrap_or_default();
+        let grid = frame.grid(units);
+        let scale = grid.step.iter().zip(frame.spacing()).map(|(step, spacing)| step / spacing);
+        // a coordinate, the origin and D products are rounded, each by half a unit in the last place of the greatest
+        let roundings = (D + 2) as f64 * f64::EPSILON * greatest(&frame);
+        let rounding = roundings * scale.fold(0.0, f64::max);
+        Self { frame, units, bounds: grid.bounds(), rounding }
+    }
+
+    /// The place in the lattice, on a side of the box where rounding took it off.
+    fn in_lattice(&self, world: &Point<D>) -> Point<D> {
+        on_sides(self.frame.world_to_lattice(self.units, world), &self.bounds, self.rounding)
+    }
+}
+
+/// The greatest coordinate in the world, without its sign, of a corner of the box.
+fn greatest<const D: usize>(frame: &Frame<D>) -> f64 {
+    let last = frame.shape().map(|n| (n - 1) as f64);
+    let corner = |n: usize| std::array::from_fn(|k| if n >> k & 1 == 0 { 0.0 } else { last[k] });
+    let corners = (0..1 << D).map(|n| frame.lattice_to_world(Units::Samples, &corner(n)));
+    corners.flatten().fold(0.0, |most, x| most.max(x.abs()))
+}
+
+impl<const D: usize> LoadedCells<D> {
+    /// Checks what the cells promise, in the lattice, where the box has its sides: see [`PolyMesh::validate`]. What
+    /// rounding of the file's coordinates can do is no fault.
+    ///
+    /// # Errors
+    /// The first fault.
+    pub fn validate(&self) -> Result<(), PolyFault> {
+        let place = Place::of(self.frame, &self.provenance);
+        let mesh = self.mesh.moved(self.frame.is_mirrored(), |p| place.in_lattice(p));
+        mesh.validate_rounded(&place.bounds, place.rounding)
+    }
+}
+
+/// The cells that a file describes.
+fn loaded<const D: usize>(
     delaunay: &Delaunay<D>,
     tools: &Tools<D>,
     raw: RawCells,
@@ -78,32 +127,54 @@ fn rebuild<const D: usize>(
         let found = "cells without the frame of an image".to_string();
         return Err(CellReadError::NotVoronoi { found });
     };
-    let units = provenance.options.get("lattice").and_then(|lattice| lattice.get("units"));
-    let units = units.and_then(|units| serde_json::from_value(units.clone()).ok());
-    let units: Units = units.unwrap_or_default();
-    let bounds = frame.grid(units).bounds();
-    let site = |site: &Point<3>| {
-        let world: Point<D> = std::array::from_fn(|k| site[k]);
-        on_sides(frame.world_to_lattice(units, &world), &bounds)
+    let place = Place::of(frame, &provenance);
+    let sites: Vec<Point<D>> = raw.sites.iter().map(flat).collect();
+    let mesh = match raw.faces {
+        Some((points, faces)) => {
+            let points: Vec<Point<D>> = points.iter().map(flat).collect();
+            let in_lattice: Vec<Point<D>> = points.iter().map(|p| place.in_lattice(p)).collect();
+            let side_of = |corners: &[u32]| side(corners, &in_lattice, &place.bounds);
+            PolyMesh::new(faces.parts(points, sites, side_of)?)?
+        }
+        None => {
+            let sites: Vec<Point<D>> = sites.iter().map(|p| place.in_lattice(p)).collect();
+            let cells = (tools.voronoi)(delaunay, &sites, place.bounds, watch)?;
+            cells.moved(frame.is_mirrored(), |p| frame.lattice_to_world(place.units, p))
+        }
     };
-    let sites: Vec<Point<D>> = raw.sites.iter().map(site).collect();
-    let cells = (tools.voronoi)(delaunay, &sites, bounds, watch)?;
-    let mesh = cells.moved(frame.is_mirrored(), |p| frame.lattice_to_world(units, p));
+    check_volumes(&mesh, &raw.volumes)?;
+    let features = features(&mesh, &raw.features);
+    Ok(LoadedCells { mesh, features, fields: raw.fields, frame, provenance })
+}
+
+fn flat<const D: usize>(place: &Point<3>) -> Point<D> {
+    std::array::from_fn(|k| place[k])
+}
+
+/// The side of the box that all corners are on.
+fn side<const D: usize>(corners: &[u32], points: &[Point<D>], bounds: &Bounds<D>) -> Option<usize> {
+    (0..2 * D).find(|side| {
+        let end = if side % 2 == 0 { bounds.min } else { bounds.max }[side / 2];
+        let is_on = |&c: &u32| points.get(c as usize).is_some_and(|p| p[side / 2] == end);
+        corners.iter().all(is_on)
+    })
+}
+
+fn check_volumes<const D: usize>(mesh: &PolyMesh<D>, volumes: &[f64]) -> Result<(), CellReadError> {
     let mean = mesh.measure() / mesh.cell_count() as f64;
-    for (cell, (&found, &expected)) in raw.volumes.iter().zip(mesh.measures()).enumerate() {
+    for (cell, (&found, &expected)) in volumes.iter().zip(mesh.measures()).enumerate() {
         let same = (found - expected).abs() <= SAME_VOLUME * mean;
         if !same {
             return Err(CellReadError::OtherCell { cell, found, expected });
         }
     }
-    let features = features(&mesh, &raw.features);
-    Ok(LoadedCells { mesh, features, fields: raw.fields, frame, provenance })
+    Ok(())
 }
 
 /// The place itself, or on a side of the box that is not further away than rounding.
-fn on_sides<const D: usize>(place: Point<D>, bounds: &Bounds<D>) -> Point<D> {
+fn on_sides<const D: usize>(place: Point<D>, bounds: &Bounds<D>, rounding: f64) -> Point<D> {
     std::array::from_fn(|k| {
-        let near = 1e-10 * (bounds.max[k] - bounds.min[k]);
+        let near = rounding.max(1e-10 * (bounds.max[k] - bounds.min[k]));
         let sides = [bounds.min[k], bounds.max[k]];
         sides.into_iter().find(|side| (place[k] - side).abs() <= near).unwrap_or(place[k])
     })

@@ -51,6 +51,7 @@ pub(super) fn read_list(path: &Path) -> Result<RawCells, CellReadError> {
     let features = pairs.zip(faces.column("feature")?).filter(|(_, feature)| *feature >= 1.0);
     let text = head.get("metadata").map(Value::to_string).unwrap_or_default();
     Ok(RawCells {
+        faces: None,
         dimension,
         sites: (0..count).map(place).collect(),
         volumes: cells.column("volume")?,

@@ -8,6 +8,7 @@ use atomesh::watch::Watch;
 use super::super::cell_fields::CellFields;
 use super::super::column::{Column, Endian};
 use super::super::error::MeshWriteError;
+use super::super::field::Values;
 use super::super::metadata;
 use super::super::vtu::appended::Head;
 use super::CellData;
@@ -16,9 +17,20 @@ use super::CellData;
 const POLYGON: u8 = 7;
 const POLYHEDRON: u8 = 42;
 
-/// Writes polygons or polyhedra as a VTU file, which ParaView and meshio read, with the arrays `volume` (in 2-D
-/// the area) and `site` (`center` where cells have no sites), one value a cell. Polygons have them as cell data; polyhedra as field data, since
-/// meshio 5 sorts polyhedra by their number of points, but cell data another way, and then refuses them.
+/// The array of each cell's place in the mesh.
+pub(super) const CELL: &str = "cell";
+
+/// The arrays of faces on features: their two cells, by their places in the mesh, and the feature's number.
+pub(super) const FEATURE_CELLS: &str = "feature_cells";
+pub(super) const FEATURE: &str = "feature";
+
+/// Writes polygons or polyhedra as a VTU file, which ParaView and meshio read, with the cell arrays `volume` (in 2-D
+/// the area) and `site` (`center` where cells have no sites). Faces on features are in the field data:
+/// `feature_cells`, the two cells of each, and `feature`, the number of its feature.
+///
+/// Polyhedra stand in the order of their number of points, since meshio 5 sorts them so, but their data another way, and
+/// refuses files in which that differs. The array `cell` has each one's place in the mesh, the number by which other
+/// files and `feature_cells` call it. Polygons stand in the mesh's order.
 ///
 /// # Errors
 /// If `out` cannot be written to or does not seek, or the watch ends the work.
@@ -30,8 +42,7 @@ pub fn write_cells_vtu<const D: usize>(
     write_cells_vtu_with(out, data, &CellFields::new(data.mesh.cell_count()), watch)
 }
 
-/// Writes polygons or polyhedra with fields, as cell data. ParaView reads them; of polyhedra meshio 5 refuses
-/// cell data.
+/// Writes polygons or polyhedra with fields, as cell data.
 ///
 /// # Errors
 /// As [`write_cells_vtu`].
@@ -42,34 +53,20 @@ pub fn write_cells_vtu_with<const D: usize>(
     watch: &mut dyn Watch,
 ) -> Result<(), MeshWriteError> {
     let (text, mesh) = (data.metadata(), data.mesh);
-    let topology = Topology::of(mesh);
-    let centers = padded(mesh.centers());
-    let center_name = if mesh.sites().is_some() { "site" } else { "center" };
+    let order = file_order(mesh);
+    let topology = Topology::of(mesh, &order);
+    let features = FeatureArrays::of(data);
     let points = padded(mesh.points());
     let mut head = Head::new("UnstructuredGrid");
     head.text("<FieldData>\n");
     head.field_data("UInt8", metadata::NAME, Column::slice(text.as_bytes(), Endian::Little));
+    features.name_in(&mut head);
     let (count, cells) = (mesh.points().len(), mesh.cell_count());
     let vectors = "NumberOfComponents=\"3\"";
-    let (volume, center) =
-        (Column::slice(mesh.measures(), Endian::Little), Column::slice(&centers, Endian::Little));
-    let piece = format!("<Piece NumberOfPoints=\"{count}\" NumberOfCells=\"{cells}\">\n");
-    if D == 2 {
-        head.text(&format!("</FieldData>\n{piece}<CellData>\n"));
-        head.array("Float64", "volume", "", volume);
-        head.array("Float64", center_name, vectors, center);
-        head.cell_fields(fields.numbers(), fields.vectors());
-        head.text("</CellData>\n<Points>\n");
-    } else {
-        let tuples = format!("NumberOfTuples=\"{cells}\"");
-        head.array("Float64", "volume", &tuples, volume);
-        head.array("Float64", center_name, &format!("{vectors} {tuples}"), center);
-        head.text(&format!("</FieldData>\n{piece}"));
-        if !fields.is_empty() {
-            head.cell_data(fields.numbers(), fields.vectors(), None);
-        }
-        head.text("<Points>\n");
-    }
+    head.text("</FieldData>\n");
+    head.text(&format!("<Piece NumberOfPoints=\"{count}\" NumberOfCells=\"{cells}\">\n"));
+    name_cell_data(&mut head, mesh, &order, fields);
+    head.text("<Points>\n");
     head.array("Float64", "Points", vectors, Column::slice(&points, Endian::Little));
     head.text("</Points>\n<Cells>\n");
     head.array("Int64", "connectivity", "", Column::slice(&topology.corners, Endian::Little));
@@ -82,6 +79,104 @@ pub fn write_cells_vtu_with<const D: usize>(
     }
     head.text("</Cells>\n</Piece>\n");
     head.write(out, watch)
+}
+
+/// The cells in the order in which they stand in the file.
+fn file_order<const D: usize>(mesh: &PolyMesh<D>) -> Vec<u32> {
+    let mut order: Vec<u32> = (0..mesh.cell_count() as u32).collect();
+    if D == 3 {
+        order.sort_by_cached_key(|&cell| corners_of(mesh, cell as usize).len());
+    }
+    order
+}
+
+/// The points of a cell, ascending.
+fn corners_of<const D: usize>(mesh: &PolyMesh<D>, cell: usize) -> Vec<u32> {
+    let faces = mesh.faces_of(cell);
+    let mut corners: Vec<u32> = faces.flat_map(|(face, _)| mesh.face(face)).copied().collect();
+    corners.sort_unstable();
+    corners.dedup();
+    corners
+}
+
+/// Names what is known of the cells, in the file's order.
+fn name_cell_data<'a, const D: usize>(
+    head: &mut Head<'a>,
+    mesh: &'a PolyMesh<D>,
+    order: &'a [u32],
+    fields: &CellFields<'a, D>,
+) {
+    let (little, cells) = (Endian::Little, order.len());
+    let place = move |at: usize| order[at] as usize;
+    let vector = |vectors: &'a [[f64; D]]| {
+        let component = move |i: usize| vectors[place(i / 3)].get(i % 3).copied().unwrap_or(0.0);
+        Column::numbers(3 * cells, little, component)
+    };
+    let three = "NumberOfComponents=\"3\"";
+    head.text("<CellData>\n");
+    let measures = mesh.measures();
+    head.array(
+        "Float64",
+        "volume",
+        "",
+        Column::numbers(cells, little, move |i| measures[place(i)]),
+    );
+    let center_name = if mesh.sites().is_some() { "site" } else { "center" };
+    head.array("Float64", center_name, three, vector(mesh.centers()));
+    if D == 3 {
+        head.array("UInt32", CELL, "", Column::slice(order, little));
+    }
+    for field in fields.numbers() {
+        let name = field.name();
+        match field.values() {
+            Values::Single(values) => {
+                let column = Column::numbers(cells, little, move |i| values[place(i)]);
+                head.array("Float32", name, "", column);
+            }
+            Values::Double(values) => {
+                let column = Column::numbers(cells, little, move |i| values[place(i)]);
+                head.array("Float64", name, "", column);
+            }
+        }
+    }
+    for field in fields.vectors() {
+        head.array("Float64", field.name(), three, vector(field.vectors()));
+    }
+    head.text("</CellData>\n");
+}
+
+/// The faces on features.
+#[derive(Default)]
+struct FeatureArrays {
+    cells: Vec<u32>,
+    features: Vec<u32>,
+}
+
+impl FeatureArrays {
+    fn of<const D: usize>(data: &CellData<D>) -> Self {
+        let mut arrays = Self::default();
+        for (face, &neighbour) in data.mesh.neighbours().iter().enumerate() {
+            match data.features.of_faces.get(face) {
+                Some(&feature) if feature > 0 => {
+                    arrays.cells.extend([data.mesh.owners()[face], neighbour]);
+                    arrays.features.push(feature);
+                }
+                _ => {}
+            }
+        }
+        arrays
+    }
+
+    /// Names the arrays if they are not empty.
+    fn name_in<'a>(&'a self, head: &mut Head<'a>) {
+        if self.features.is_empty() {
+            return;
+        }
+        let count = self.features.len();
+        let pairs = format!("NumberOfComponents=\"2\" NumberOfTuples=\"{count}\"");
+        head.array("UInt32", FEATURE_CELLS, &pairs, Column::slice(&self.cells, Endian::Little));
+        head.field_data("UInt32", FEATURE, Column::slice(&self.features, Endian::Little));
+    }
 }
 
 /// Coordinates one after another, three a point.
@@ -100,9 +195,9 @@ struct Topology {
 }
 
 impl Topology {
-    fn of<const D: usize>(mesh: &PolyMesh<D>) -> Self {
+    fn of<const D: usize>(mesh: &PolyMesh<D>, order: &[u32]) -> Self {
         let mut topology = Self::default();
-        for cell in 0..mesh.cell_count() {
+        for cell in order.iter().map(|&cell| cell as usize) {
             if D == 2 {
                 topology.corners.extend(mesh.polygon(cell).into_iter().map(i64::from));
             } else {
@@ -116,7 +211,6 @@ impl Topology {
     /// The faces run counter-clockwise as seen from outside the cell.
     fn add_polyhedron<const D: usize>(&mut self, mesh: &PolyMesh<D>, cell: usize) {
         self.faces.push(mesh.faces_of(cell).count() as i64);
-        let start = self.corners.len();
         for (face, sign) in mesh.faces_of(cell) {
             let corners = mesh.face(face);
             self.faces.push(corners.len() as i64);
@@ -125,17 +219,8 @@ impl Topology {
             if sign < 0.0 {
                 self.faces[first..].reverse();
             }
-            self.corners.extend(corners.iter().map(|&c| i64::from(c)));
         }
         self.face_ends.push(self.faces.len() as i64);
-        self.corners[start..].sort_unstable();
-        let mut kept = start;
-        for at in start..self.corners.len() {
-            if at == start || self.corners[at] != self.corners[kept - 1] {
-                self.corners[kept] = self.corners[at];
-                kept += 1;
-            }
-        }
-        self.corners.truncate(kept);
+        self.corners.extend(corners_of(mesh, cell).into_iter().map(i64::from));
     }
 }

@@ -3,9 +3,10 @@
 use std::collections::HashMap;
 use std::io::Write;
 
-use atomesh::mesh::{Mesh, Tags};
+use atomesh::mesh::Tags;
 use atomesh::watch::{Phase, Watch, check};
 
+use super::super::behind::cell_behind;
 use super::super::data::MeshData;
 use super::super::error::MeshWriteError;
 use super::super::metadata;
@@ -17,6 +18,9 @@ const CHUNK: usize = 1 << 18;
 
 /// Lines between two looks at the watch.
 const LINES_PER_STEP: usize = 1 << 18;
+
+/// The most characters of a real number, in Abaqus and in CalculiX.
+const WIDTH: usize = 20;
 
 /// The most letters of a line of comment; lines may have 256.
 const COMMENT: usize = 200;
@@ -52,8 +56,8 @@ pub fn write_inp<const D: usize>(
     }
     to.line(format_args!("*NODE"))?;
     for (i, p) in data.nodes().iter().enumerate() {
-        let z = p.get(2).copied().unwrap_or(0.0);
-        to.line(format_args!("{}, {:?}, {:?}, {z:?}", i + 1, p[0], p[1]))?;
+        let [x, y, z] = [0, 1, 2].map(|k| number(p.get(k).copied().unwrap_or(0.0)));
+        to.line(format_args!("{}, {x}, {y}, {z}", i + 1))?;
     }
     let each = data.nodes_per_cell();
     to.line(format_args!("*ELEMENT, TYPE={}, ELSET={CELLS}", element_type(each)))?;
@@ -66,6 +70,25 @@ pub fn write_inp<const D: usize>(
         facet_groups(&mut to, data, tags)?;
     }
     to.flush()
+}
+
+/// The number in at most [`WIDTH`] characters: of more, programs read the first, and take e-12 for e-1.
+fn number(x: f64) -> String {
+    let text = format!("{x:?}");
+    if text.len() <= WIDTH {
+        return text;
+    }
+    match text.split_once('e') {
+        Some((mantissa, exponent)) => {
+            let before = mantissa.find('.').unwrap_or(mantissa.len()) + 1;
+            let digits = WIDTH - before - 1 - exponent.len();
+            format!("{x:.digits$e}")
+        }
+        None => {
+            let digits = WIDTH.saturating_sub(text.find('.').unwrap_or(text.len()) + 1);
+            format!("{x:.digits$}")
+        }
+    }
 }
 
 fn regions<W: Write, const D: usize>(
@@ -104,8 +127,8 @@ fn facet_groups<W: Write, const D: usize>(
         to.list(&nodes)?;
         let mut faces = vec![Vec::new(); D + 2];
         for facet in &group.facets {
-            if let Some(face) = face_behind(mesh, facet, mesh.cells_beside(facet, &cells)) {
-                faces[face.number].push(face.element);
+            if let Some(behind) = cell_behind(mesh, facet, mesh.cells_beside(facet, &cells)) {
+                faces[face_number(D, behind.opposite)].push(behind.cell + 1);
             }
         }
         let used = || faces.iter().enumerate().filter(|(_, cells)| !cells.is_empty());
@@ -119,39 +142,6 @@ fn facet_groups<W: Write, const D: usize>(
         }
     }
     Ok(())
-}
-
-/// A face of an element, both by their numbers.
-struct Face {
-    element: usize,
-    number: usize,
-}
-
-/// The face that a facet is, of the cell whose own facet there is turned alike; else of the first of the
-/// cells `beside` it.
-fn face_behind<const D: usize>(
-    mesh: &Mesh<D>,
-    facet: &[u32; D],
-    beside: impl Iterator<Item = u32>,
-) -> Option<Face> {
-    let mut first = None;
-    for cell in beside {
-        let corners = &mesh.corners()[cell as usize * (D + 1)..][..D + 1];
-        let opposite = corners.iter().position(|c| !facet.contains(c)).unwrap_or(0);
-        let face = Face { element: cell as usize + 1, number: face_number(D, opposite) };
-        if is_rotated(&mesh.facet_of(cell as usize, opposite), facet) {
-            return Some(face);
-        }
-        first = first.or(Some(face));
-    }
-    first
-}
-
-/// Whether the corners follow one another in the same order around.
-fn is_rotated<const D: usize>(a: &[u32; D], b: &[u32; D]) -> bool {
-    let shift = b.iter().position(|corner| *corner == a[0]).unwrap_or(0);
-    // an edge has its two ends in one order alone
-    if D == 2 { a == b } else { (0..D).all(|k| a[k] == b[(k + shift) % D]) }
 }
 
 /// Lines of text.
@@ -188,5 +178,27 @@ impl<W: Write> Lines<'_, W> {
         self.out.write_all(&self.bytes)?;
         self.bytes.clear();
         Ok(())
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn numbers_have_twenty_characters_at_most_and_lose_no_more_than_rounding() {
+        let digits = 1.234_567_890_123_456_7;
+        for exponent in -300..=300 {
+            for x in [digits, -digits, 9.999_999_999_999_999] {
+                let x: f64 = x * 10f64.powi(exponent);
+                let text = number(x);
+                assert!(text.len() <= WIDTH, "{text}");
+                let back: f64 = text.parse().unwrap();
+                // a sign, a point and e-300 leave twelve digits
+                assert!((back - x).abs() <= 1e-12 * x.abs(), "{text}");
+            }
+        }
+        assert_eq!(number(-1.234_567_890_123_456_7e-10), "-1.2345678901235e-10");
+        assert_eq!(number(0.1), "0.1");
     }
 }

@@ -1,15 +1,22 @@
 //! MSH, the format of Gmsh: versions 4.1 and 2.2, binary and text.
 //!
-//! Points and cells are numbered from 1 in the mesh's order. Points belong to one entity, numbered 1, and
-//! so do cells, unless they have regions: then each region is an entity. Regions and groups of facets are
-//! physical groups with names; where there are groups but no regions, all cells are in one named `domain`.
-//! Physical groups have numbers above 0: regions of other numbers get the next ones, and the comment tells
-//! which. A facet of several groups is turned as the first of them has it. Fields at points are `$NodeData`,
-//! fields in cells `$ElementData`. The frame and the provenance are JSON in `$Comments`, a section that Gmsh
-//! ignores.
+//! Points are numbered from 1 in the mesh's order and belong to one entity, numbered 1, and so do cells, unless they
+//! have regions: then each region is an entity, and its cells stand together in version 4.1. Elements are numbered from
+//! 1 in the order in which they stand, facets after cells. Where cells do not stand in the mesh's order, `$CellOrder`, a
+//! section that others ignore, has the place of each in it, from 0 on.
+//!
+//! Regions and groups of facets are physical groups with names and numbers, above 0 and no two the same; where there
+//! are groups but no regions, all cells are in one named `domain`. Regions keep the numbers that they have, but those
+//! below 1; groups of facets keep theirs unless a region has one of them; the comment tells which number stands for
+//! which. A facet of several groups is turned as the first of them has it.
+//!
+//! Fields at points are `$NodeData`, fields in cells `$ElementData`, vectors too; a facet has there the value of the
+//! cell behind it. (meshio 5 reads them in version 4.1; in 2.2 it fails on values in files of more than one kind of
+//! element, its own too.) The frame and the provenance are JSON in `$Comments`, a section that Gmsh ignores.
 
 mod entities;
 mod read;
+mod values;
 mod write;
 
 pub use super::format::{MshEncoding, MshVersion};

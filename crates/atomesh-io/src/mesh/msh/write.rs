@@ -9,14 +9,17 @@ use atomesh::watch::{Phase, Watch, check};
 use super::super::column::{Endian, Number};
 use super::super::data::MeshData;
 use super::super::error::MeshWriteError;
-use super::super::field::Field;
 use super::super::format::{MshEncoding, MshVersion};
 use super::super::metadata;
 use super::entities::Entities;
+use super::values::{Quantity, element_cells};
 use super::{element_type, place};
 
 /// Bytes gathered before they are handed on.
 const CHUNK: usize = 1 << 18;
+
+/// Numbers a line where the order of cells is told.
+const CELLS_A_LINE: usize = 16;
 
 /// Cells or points between two looks at the watch.
 const ITEMS_PER_STEP: usize = 1 << 18;
@@ -39,12 +42,13 @@ pub fn write_msh<const D: usize>(
     if i32::try_from(count).is_err() {
         return Err(MeshWriteError::TooMany { format: "MSH", count, limit: i32::MAX as usize });
     }
-    let steps = 2 + data.point_fields().len() + data.cell_fields().len();
+    let fields = data.cell_fields().len() + data.cell_vectors().len();
+    let steps = 2 + data.point_fields().len() + fields;
     let items = (steps * count.max(1)) as f64;
     let mut numbers = Numbers { out, bytes: vec![], encoding, watch, done: 0, items };
     numbers.head(
         version,
-        &metadata::encode_with_regions(data.frame(), data.provenance(), &entities.known_as),
+        &metadata::encode_with_numbers(data.frame(), data.provenance(), &entities.known_as),
     )?;
     physical_names(&mut numbers, &entities);
     match version {
@@ -59,10 +63,19 @@ pub fn write_msh<const D: usize>(
         }
     }
     for field in data.point_fields() {
-        field_data(&mut numbers, "NodeData", field)?;
+        let values = field.values();
+        let points = 0..values.len() as u32;
+        field_data(&mut numbers, "NodeData", &Quantity::numbers(field), points)?;
     }
-    for field in data.cell_fields() {
-        field_data(&mut numbers, "ElementData", field)?;
+    if fields > 0 {
+        let cells = element_cells(data, &entities, version);
+        let all = || cells.iter().copied();
+        for field in data.cell_fields() {
+            field_data(&mut numbers, "ElementData", &Quantity::numbers(field), all())?;
+        }
+        for field in data.cell_vectors() {
+            field_data(&mut numbers, "ElementData", &Quantity::vectors(field), all())?;
+        }
     }
     numbers.flush()
 }
@@ -123,6 +136,11 @@ impl<W: Write> Numbers<'_, W> {
     /// Ends a point or cell.
     fn item(&mut self) -> Result<(), MeshWriteError> {
         self.line();
+        self.item_of_text()
+    }
+
+    /// Counts what was written, and hands it on where it is much.
+    fn item_of_text(&mut self) -> Result<(), MeshWriteError> {
         self.done += 1;
         if self.done.is_multiple_of(ITEMS_PER_STEP) {
             check(self.watch, Phase::Write, (self.done as f64 / self.items).min(1.0), None)?;
@@ -215,7 +233,9 @@ fn nodes_41<W: Write, const D: usize>(
     Ok(())
 }
 
-/// One block an entity: the cells of each region, numbered as in the mesh, and the facets after them.
+/// One block an entity: the cells of each region, and the facets after them, numbered from 1 in the order in which they
+/// stand, since readers that pass over numbers take values by that order. Where it is not the mesh's, a section of
+/// its own says it.
 fn elements_41<W: Write, const D: usize>(
     to: &mut Numbers<W>,
     data: &MeshData<D>,
@@ -227,19 +247,20 @@ fn elements_41<W: Write, const D: usize>(
     to.text("$Elements\n");
     to.sizes([entities.cells.len() + entities.facets.len(), count, count.min(1), count]);
     to.line();
+    let mut tag = 0;
     for (at, (entity, cells)) in entities.cells_by_entity().enumerate() {
         to.ints([D, at + 1]);
         to.put(element_type(D, is_quadratic));
         to.size(entity.count);
         to.line();
         for cell in cells.iter().map(|&cell| cell as usize) {
-            to.size(cell + 1);
+            tag += 1;
+            to.size(tag);
             let nodes = &data.cell_nodes()[cell * each..(cell + 1) * each];
             (0..each).for_each(|k| to.size(nodes[place(each, k)] as usize + 1));
             to.item()?;
         }
     }
-    let mut tag = cell_count;
     for (at, entity) in entities.facets.iter().enumerate() {
         to.ints([D - 1, at + 1]);
         to.put(element_type(D - 1, is_quadratic));
@@ -253,6 +274,22 @@ fn elements_41<W: Write, const D: usize>(
         }
     }
     to.end("Elements");
+    cell_order(to, entities.order())
+}
+
+/// The place in the mesh of each cell, from 0 on, as text, unless they stand in the mesh's order.
+fn cell_order<W: Write>(to: &mut Numbers<W>, order: &[u32]) -> Result<(), MeshWriteError> {
+    if order.is_sorted() {
+        return Ok(());
+    }
+    to.text(&format!("$CellOrder\n{}\n", order.len()));
+    for cells in order.chunks(CELLS_A_LINE) {
+        let words: Vec<String> = cells.iter().map(u32::to_string).collect();
+        to.text(&words.join(" "));
+        to.text("\n");
+        to.item_of_text()?;
+    }
+    to.text("$EndCellOrder\n");
     Ok(())
 }
 
@@ -354,18 +391,20 @@ fn elements_22<W: Write, const D: usize>(
     Ok(())
 }
 
-/// A field, in the form that both versions share.
+/// A field, in the form that both versions share; `places` are those of its values, one for each point or element in
+/// the file's order.
 fn field_data<W: Write>(
     to: &mut Numbers<W>,
     section: &str,
-    field: &Field,
+    field: &Quantity,
+    places: impl ExactSizeIterator<Item = u32>,
 ) -> Result<(), MeshWriteError> {
-    let (name, count) = (field.name(), field.values().len());
+    let (name, components, count) = (field.name, field.components, places.len());
     // one string: the name; one real: the time; three integers: time step, components, values
-    to.text(&format!("${section}\n1\n\"{name}\"\n1\n0\n3\n0\n1\n{count}\n"));
-    for i in 0..count {
+    to.text(&format!("${section}\n1\n\"{name}\"\n1\n0\n3\n0\n{components}\n{count}\n"));
+    for (i, place) in places.enumerate() {
         to.int(i + 1);
-        to.real(field.values().get(i));
+        (0..components).for_each(|k| to.real(field.value(place, k)));
         to.item()?;
     }
     to.end(section);

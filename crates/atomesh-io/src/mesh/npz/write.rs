@@ -39,6 +39,10 @@ pub fn write_npz<const D: usize>(
             (format!("cell.{}", field.name()), Column::values(field.values(), little));
         arrays.push(Array::new(&name, kind(field), &[cells], column));
     }
+    for field in data.cell_vectors() {
+        let column = Column::slice(field.vectors().as_flattened(), little);
+        arrays.push(Array::new(&format!("cell.{}", field.name()), "<f8", &[cells, D], column));
+    }
     let bytes = Column::slice(text.as_bytes(), little);
     arrays.push(Array::new("metadata", &format!("|S{}", text.len()), &[], bytes));
 

@@ -4,6 +4,7 @@ use std::io::Write;
 
 use atomesh::watch::{Phase, Watch, check};
 
+use super::super::cell_fields::VectorField;
 use super::super::column::{Column, Endian};
 use super::super::data::MeshData;
 use super::super::error::MeshWriteError;
@@ -51,18 +52,24 @@ pub fn write_vtk<const D: usize>(
     let kind = i32::from(vtu::cell_type(count));
     Column::numbers(cells, big, move |_| kind).write(out)?;
     writeln!(out, "\nPOINT_DATA {points}")?;
-    fields(out, data.point_fields())?;
+    fields::<D>(out, data.point_fields(), &[])?;
     check(watch, Phase::Write, 0.9, None)?;
     writeln!(out, "CELL_DATA {cells}")?;
-    fields(out, data.cell_fields())?;
+    fields(out, data.cell_fields(), data.cell_vectors())?;
     Ok(())
 }
 
-fn fields(out: &mut impl Write, fields: &[Field]) -> Result<(), MeshWriteError> {
-    if fields.is_empty() {
+/// Numbers, then vectors of three components, z being 0 in flat meshes.
+fn fields<const D: usize>(
+    out: &mut impl Write,
+    fields: &[Field],
+    vectors: &[VectorField<D>],
+) -> Result<(), MeshWriteError> {
+    let count = fields.len() + vectors.len();
+    if count == 0 {
         return Ok(());
     }
-    writeln!(out, "FIELD FieldData {}", fields.len())?;
+    writeln!(out, "FIELD FieldData {count}")?;
     for field in fields {
         let kind = match field.values() {
             Values::Single(_) => "float",
@@ -70,6 +77,11 @@ fn fields(out: &mut impl Write, fields: &[Field]) -> Result<(), MeshWriteError> 
         };
         writeln!(out, "{} 1 {} {kind}", field.name(), field.values().len())?;
         Column::values(field.values(), Endian::Big).write(out)?;
+        writeln!(out)?;
+    }
+    for field in vectors {
+        writeln!(out, "{} 3 {} double", field.name(), field.vectors().len())?;
+        Column::points(field.vectors(), Endian::Big).write(out)?;
         writeln!(out)?;
     }
     Ok(())

@@ -125,10 +125,12 @@ impl<'a> Head<'a> {
         let start = out.stream_position()?;
         out.write_all(&self.xml)?;
         let body = out.stream_position()?;
+        let rewritten = Rewritten::of(self.arrays.iter().map(|(_, column)| column));
         let mut offsets = Vec::new();
         for (i, (_, column)) in self.arrays.iter().enumerate() {
             offsets.push(out.stream_position()? - body);
-            write_array(out, column, &mut |share| {
+            let is_taken = |end: u64| rewritten.meets(i + 1, end - body);
+            write_array(out, column, &is_taken, &mut |share| {
                 let done = (i as f64 + share) / self.arrays.len() as f64;
                 Ok(check(watch, Phase::Write, done, None)?)
             })?;
@@ -147,10 +149,12 @@ impl<'a> Head<'a> {
 
 /// Writes one array: the number of blocks, the bytes of a block, of the last one if it is shorter, the
 /// compressed bytes of each, and the blocks. The lengths are known last, and so written last: only a few
-/// blocks are held at a time. `step` is told the share that is done.
+/// blocks are held at a time. The array ends where `is_taken` does not hold, if it is not empty. `step` is told the
+/// share that is done.
 fn write_array(
     out: &mut (impl Write + Seek),
     column: &Column,
+    is_taken: &dyn Fn(u64) -> bool,
     step: &mut dyn FnMut(f64) -> Result<(), MeshWriteError>,
 ) -> Result<(), MeshWriteError> {
     let ranges: Vec<_> = column.blocks(BLOCK).collect();
@@ -164,7 +168,7 @@ fn write_array(
     header.truncate(3);
     step(0.0)?;
     for some in ranges.chunks(BLOCKS_PER_STEP) {
-        let blocks: io::Result<Vec<_>> = some
+        let blocks: io::Result<Vec<Vec<u8>>> = some
             .par_iter()
             .map_init(Vec::new, |raw, range| {
                 raw.clear();
@@ -172,7 +176,10 @@ fn write_array(
                 compress(raw)
             })
             .collect();
-        for block in blocks? {
+        for mut block in blocks? {
+            if header.len() + 1 == ranges.len() + 3 {
+                pad(&mut block, out.stream_position()?, is_taken);
+            }
             out.write_all(&block)?;
             header.push(block.len() as u64);
         }
@@ -190,4 +197,135 @@ fn compress(raw: &[u8]) -> io::Result<Vec<u8>> {
     let mut zlib = ZlibEncoder::new(Vec::with_capacity(raw.len() / 2), Compression::new(LEVEL));
     zlib.write_all(raw)?;
     zlib.finish()
+}
+
+/// Makes a zlib stream that begins at `start` longer until its end is not taken.
+fn pad(stream: &mut Vec<u8>, start: u64, is_taken: &dyn Fn(u64) -> bool) {
+    while is_taken(start + stream.len() as u64) {
+        let after_head = 2..2;
+        stream.splice(after_head, EMPTY_BLOCK);
+    }
+}
+
+/// A block of deflate that is stored, not the last, and empty.
+const EMPTY_BLOCK: [u8; 5] = [0, 0, 0, 0xff, 0xff];
+
+/// The offsets that meshio gives to arrays while it reads.
+///
+/// It takes raw files apart by offsets, and writes each array's new one, that of a file in base64, over the old one in
+/// the head. Where an array's own offset is one that it gave to an array before, it finds the wrong one. So no
+/// array begins at such an offset.
+struct Rewritten {
+    /// The new offset of each array.
+    offsets: Vec<u64>,
+    /// Whether each array has no numbers.
+    is_empty: Vec<bool>,
+}
+
+impl Rewritten {
+    fn of<'a>(columns: impl Iterator<Item = &'a Column<'a>>) -> Self {
+        let (mut at, mut offsets, mut is_empty) = (0, Vec::new(), Vec::new());
+        for column in columns {
+            offsets.push(at);
+            let bytes = (column.count() * column.item_size()) as u64;
+            is_empty.push(bytes == 0);
+            at += 4 * (WORD + bytes).div_ceil(3);
+        }
+        Self { offsets, is_empty }
+    }
+
+    /// Whether array `next`, if it began at this offset, or an empty one after it, would have the new offset of one
+    /// before it.
+    fn meets(&self, next: usize, offset: u64) -> bool {
+        let mut at = offset;
+        for array in next..self.offsets.len() {
+            if self.offsets[..array].contains(&at) {
+                return true;
+            }
+            if !self.is_empty[array] {
+                return false;
+            }
+            at += 3 * WORD; // the head of an array without blocks
+        }
+        false
+    }
+}
+
+/// Bytes of a number in the head of an array.
+const WORD: u64 = 8;
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use std::io::{Cursor, Read};
+
+    use atomesh::watch::Silent;
+    use flate2::read::ZlibDecoder;
+
+    /// The offsets that the head of a file of these arrays names.
+    fn offsets(arrays: &[Vec<u8>]) -> Vec<u64> {
+        let mut head = Head::new("UnstructuredGrid");
+        for array in arrays {
+            head.array("UInt8", "a", "", Column::slice(array, Endian::Little));
+        }
+        let mut file = Cursor::new(Vec::new());
+        head.write(&mut file, &mut Silent).unwrap();
+        let bytes = file.into_inner();
+        let text = String::from_utf8_lossy(&bytes).into_owned();
+        let words = text.split("offset=\"").skip(1);
+        words.map(|rest| rest.split('"').next().unwrap().parse().unwrap()).collect()
+    }
+
+    /// Bytes that zlib makes no shorter.
+    fn noise(count: usize) -> Vec<u8> {
+        let mut state = 1u32;
+        let mut next = || {
+            state = state.wrapping_mul(1_664_525).wrapping_add(1_013_904_223);
+            (state >> 24) as u8
+        };
+        (0..count).map(|_| next()).collect()
+    }
+
+    #[test]
+    fn no_array_begins_where_meshio_has_put_one_before_it() {
+        let mut padded = 0;
+        for empty in [0, 1, 2] {
+            // the first array is rewritten to take more room than it has, so that the third meets the second's place
+            for count in 0..200 {
+                let mut arrays = vec![vec![7; 300], noise(count)];
+                arrays.extend(vec![Vec::new(); empty]);
+                arrays.extend([noise(50), noise(9), vec![3; 4000]]);
+                let found = offsets(&arrays);
+                let columns: Vec<_> =
+                    arrays.iter().map(|a| Column::slice(a, Endian::Little)).collect();
+                let rewritten = Rewritten::of(columns.iter());
+                for (at, offset) in found.iter().enumerate() {
+                    assert!(!rewritten.offsets[..at].contains(offset), "array {at} at {offset}");
+                }
+                padded += usize::from(is_padded(&found, &arrays));
+            }
+        }
+        assert!(padded > 0, "none of these files met the case");
+    }
+
+    /// Whether an array takes more room than its head and its block.
+    fn is_padded(offsets: &[u64], arrays: &[Vec<u8>]) -> bool {
+        let size = |a: &Vec<u8>| match a.len() {
+            0 => 24,
+            _ => 32 + compress(a).unwrap().len() as u64,
+        };
+        offsets.windows(2).zip(arrays).any(|(pair, array)| pair[1] - pair[0] != size(array))
+    }
+
+    #[test]
+    fn a_longer_stream_says_the_same() {
+        let raw = noise(1000);
+        let mut stream = compress(&raw).unwrap();
+        let length = stream.len() as u64;
+        pad(&mut stream, 100, &|end| end < 100 + length + 12);
+        assert_eq!(stream.len() as u64, length + 15);
+        let mut back = Vec::new();
+        ZlibDecoder::new(&stream[..]).read_to_end(&mut back).unwrap();
+        assert_eq!(back, raw);
+    }
 }

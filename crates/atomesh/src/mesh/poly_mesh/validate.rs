@@ -161,14 +161,24 @@ impl<const D: usize> PolyMesh<D> {
     /// # Errors
     /// The first fault, in this order of cells.
     pub fn validate(&self, bounds: &Bounds<D>) -> Result<(), PolyFault> {
+        self.validate_rounded(bounds, 0.0)
+    }
+
+    /// [`Self::validate`] for points and sites that were rounded, each by `rounding` at most, in the unit of the
+    /// coordinates: planes of faces may be as much further off, and turned as much as that turns the face.
+    ///
+    /// # Errors
+    /// As [`Self::validate`].
+    pub fn validate_rounded(&self, bounds: &Bounds<D>, rounding: f64) -> Result<(), PolyFault> {
         self.check_cells()?;
         self.check_faces(bounds)?;
-        let limit = PLANAR * mean_distance(bounds, self.cell_count());
+        let planar = PLANAR * mean_distance(bounds, self.cell_count());
+        let limits = Limits { planar, rounding };
         let faults: Vec<PolyFault> = (0..self.cell_count().div_ceil(BLOCK))
             .into_par_iter()
             .filter_map(|block| {
                 let cells = block * BLOCK..((block + 1) * BLOCK).min(self.cell_count());
-                cells.into_iter().find_map(|cell| self.fault_of(cell, limit))
+                cells.into_iter().find_map(|cell| self.fault_of(cell, limits))
             })
             .collect();
         if let Some(fault) = faults.into_iter().next() {
@@ -200,7 +210,7 @@ impl<const D: usize> PolyMesh<D> {
         Ok(())
     }
 
-    fn fault_of(&self, cell: usize, limit: f64) -> Option<PolyFault> {
+    fn fault_of(&self, cell: usize, limits: Limits) -> Option<PolyFault> {
         if !self.is_closed(cell) {
             return Some(PolyFault::Open { cell });
         }
@@ -209,17 +219,18 @@ impl<const D: usize> PolyMesh<D> {
         corners.sort_unstable();
         corners.dedup();
         for (face, sign) in self.faces_of(cell) {
-            let Some(plane) = self.plane(cell, face, sign, limit) else { continue };
+            let Some(plane) = self.plane(cell, face, sign, limits) else { continue };
             for &point in &corners {
-                let above = plane.above(&self.points()[point as usize]);
+                let place = &self.points()[point as usize];
+                let (above, limit) = (plane.above(place), plane.limit(place));
                 let off = if self.face(face).contains(&point) { above.abs() } else { above };
                 if off > limit {
                     return Some(PolyFault::Convex { cell, face, point, off, limit });
                 }
             }
             let site = self.sites().map(|sites| &sites[cell]);
-            if let Some(off) = site.map(|site| plane.above(site)).filter(|off| *off > limit) {
-                return Some(PolyFault::Site { cell, face, off });
+            if let Some(site) = site.filter(|site| plane.above(site) > plane.limit(site)) {
+                return Some(PolyFault::Site { cell, face, off: plane.above(site) });
             }
         }
         None
@@ -247,33 +258,60 @@ impl<const D: usize> PolyMesh<D> {
 
     /// The plane of a face, its normal out of the cell; for a face too thin to have one, the plane at right angles to
     /// the line between the two cells' centres.
-    fn plane(&self, cell: usize, face: usize, sign: f64, limit: f64) -> Option<Plane<D>> {
+    fn plane(&self, cell: usize, face: usize, sign: f64, limits: Limits) -> Option<Plane<D>> {
         let vector = self.area_vector(face);
         let area = dot(&vector, &vector).sqrt();
         let points = self.face(face).iter().map(|&c| &self.points()[c as usize]);
         let first = self.points()[self.face(face)[0] as usize];
         let longest =
             points.map(|p| difference(p, &first)).map(|v| dot(&v, &v)).fold(0.0, f64::max);
+        // the least extent of the face: in 2-D its length
+        let height = if D == 2 { area } else { area / longest.sqrt() };
         // rounding, of the order of the tolerance, turns what is thinner
-        if D == 2 || area > 1e3 * limit * longest.sqrt() {
-            return Some(Plane { through: first, normal: vector.map(|x| sign * x / area) });
+        if D == 2 || height > 1e3 * limits.planar {
+            let normal = vector.map(|x| sign * x / area);
+            return Some(Plane { through: first, normal, limits, height });
         }
         let owner = self.owners()[face] as usize;
         let other = if owner == cell { *self.neighbours().get(face)? as usize } else { owner };
         let (from, to) = (&self.centers()[cell], &self.centers()[other]);
         let axis = difference(to, from);
         let length = dot(&axis, &axis).sqrt();
-        Some(Plane { through: first, normal: axis.map(|x| x / length) })
+        let normal = axis.map(|x| x / length);
+        Some(Plane { through: first, normal, limits, height: length })
     }
+}
+
+/// How far points may be off planes.
+#[derive(Clone, Copy)]
+struct Limits {
+    /// Whatever the plane.
+    planar: f64,
+    /// How far each point may have been rounded.
+    rounding: f64,
 }
 
 struct Plane<const D: usize> {
     through: Point<D>,
     normal: Point<D>,
+    limits: Limits,
+    /// The least distance between the points that turn the plane.
+    height: f64,
 }
 
 impl<const D: usize> Plane<D> {
     fn above(&self, p: &Point<D>) -> f64 {
         dot(&difference(p, &self.through), &self.normal)
+    }
+
+    /// How far a point may be off: where the points of the plane are rounded against each other, the plane is turned by
+    /// twice the rounding over their distance; twice again for a normal that is the mean over a face.
+    fn limit(&self, p: &Point<D>) -> f64 {
+        let Limits { planar, rounding } = self.limits;
+        if rounding == 0.0 {
+            return planar;
+        }
+        let away = difference(p, &self.through);
+        planar + 2.0 * rounding * (1.0 + 2.0 * dot(&away, &away).sqrt() / self.height)
     }
 }

@@ -8,7 +8,7 @@ use std::collections::HashMap;
 use super::super::column::Endian;
 use super::super::format::{MshEncoding, MshVersion};
 use super::super::loaded::AnyMesh;
-use super::super::metadata::Metadata;
+use super::super::metadata::{KnownAs, Metadata};
 use super::super::parts::Parts;
 use super::super::read_error::{MeshReadError, excerpt, malformed};
 
@@ -35,6 +35,7 @@ pub fn read_msh(bytes: &[u8]) -> Result<AnyMesh, MeshReadError> {
         parts: Parts::default(),
         physicals: HashMap::new(),
         cell_tags: [Vec::new(), Vec::new()],
+        cell_order: None,
     };
     reader.format()?;
     while let Some(section) = reader.from.section()? {
@@ -46,11 +47,12 @@ pub fn read_msh(bytes: &[u8]) -> Result<AnyMesh, MeshReadError> {
             "NodeData" => reader.field(false)?,
             "ElementData" => reader.field(true)?,
             "Comments" => reader.comments(),
+            "CellOrder" => reader.cell_order()?,
             _ => {}
         }
         reader.from.skip_past(&format!("$End{section}"))?;
     }
-    reader.finish();
+    reader.finish()?;
     reader.parts.into_mesh()
 }
 
@@ -67,6 +69,8 @@ struct Reader<'a> {
     physicals: HashMap<(i32, i32), Vec<i32>>,
     /// The tags of triangles and of tetrahedra.
     cell_tags: [Vec<u64>; 2],
+    /// The place of each cell in the mesh, where the file says it.
+    cell_order: Option<Vec<u64>>,
 }
 
 impl Reader<'_> {
@@ -228,31 +232,74 @@ impl Reader<'_> {
         Ok(())
     }
 
-    /// Puts regions and cells as they were, if atomesh wrote them, once all sections are read.
-    fn finish(&mut self) {
-        let parts = &mut self.parts;
-        let known_as = parts.metadata.regions();
-        for (region, physical) in known_as {
-            let regions = parts.tags.triangle_regions.iter_mut();
-            let regions = regions.chain(&mut parts.tags.tetrahedron_regions);
-            regions.filter(|id| **id == physical).for_each(|id| *id = region);
-            // names of facets have a lower dimension, those of cells the greatest
-            let dimension = if parts.tetrahedra.is_empty() { 2 } else { 3 };
-            let named = |(d, id, _): &&mut (usize, i32, String)| (*d, *id) == (dimension, physical);
-            if let Some(name) = parts.tags.names.iter_mut().find(named) {
-                name.1 = region;
-            }
+    /// The places of the file's cells in the mesh, which atomesh writes where they are not in its order.
+    fn cell_order(&mut self) -> Result<(), MeshReadError> {
+        let count = self.text_count("cells")?;
+        let from = self.from.at;
+        let mut places = Vec::with_capacity(count);
+        for _ in 0..count {
+            let word: u64 = self.from.word("the place of a cell")?;
+            places.push(word);
         }
-        if parts.metadata.is_ours() {
-            let [triangles, tetrahedra] = &self.cell_tags;
-            if parts.tetrahedra.is_empty() {
-                let order = order_of(triangles);
-                sort_cells::<3>(&order, &mut parts.triangles, &mut parts.tags.triangle_regions);
-                parts.sort_fields(3, &order);
+        let mut sorted = places.clone();
+        sorted.sort_unstable();
+        if sorted.windows(2).any(|pair| pair[0] == pair[1]) {
+            return Err(malformed(from, "a place of its own for each cell", "one twice"));
+        }
+        self.cell_order = Some(places);
+        Ok(())
+    }
+
+    /// Gives regions and groups the numbers that they had, and puts cells as they were, if atomesh wrote them, once
+    /// all sections are read.
+    fn finish(&mut self) -> Result<(), MeshReadError> {
+        self.renumber();
+        if !self.parts.metadata.is_ours() {
+            return Ok(());
+        }
+        let is_flat = self.parts.tetrahedra.is_empty();
+        let [triangles, tetrahedra] = &mut self.cell_tags;
+        let cells = if is_flat { triangles } else { tetrahedra };
+        if let Some(places) = self.cell_order.take() {
+            if places.len() != cells.len() {
+                let (expected, found) = (cells.len(), places.len());
+                let expected = format!("{expected} places in $CellOrder, one a cell");
+                return Err(malformed(self.from.at, expected, found.to_string()));
             }
-            let order = order_of(tetrahedra);
+            *cells = places;
+        }
+        let order = order_of(cells);
+        let parts = &mut self.parts;
+        if is_flat {
+            sort_cells::<3>(&order, &mut parts.triangles, &mut parts.tags.triangle_regions);
+            parts.sort_fields(3, &order);
+        } else {
             sort_cells::<4>(&order, &mut parts.tetrahedra, &mut parts.tags.tetrahedron_regions);
             parts.sort_fields(4, &order);
+        }
+        Ok(())
+    }
+
+    /// Gives regions and groups the numbers that the comment says.
+    fn renumber(&mut self) {
+        let parts = &mut self.parts;
+        let KnownAs { regions, groups } = parts.metadata.known_as();
+        let region: HashMap<i32, i32> = regions.iter().map(|&(id, known)| (known, id)).collect();
+        let group: HashMap<i32, i32> =
+            groups.iter().map(|&(id, known)| (known, id as i32)).collect();
+        let give = |numbers: &HashMap<i32, i32>, id: &mut i32| {
+            *id = numbers.get(id).copied().unwrap_or(*id);
+        };
+        let is_flat = parts.tetrahedra.is_empty();
+        let tags = &mut parts.tags;
+        let of_cells = tags.triangle_regions.iter_mut().chain(&mut tags.tetrahedron_regions);
+        of_cells.for_each(|id| give(&region, id));
+        tags.edges.iter_mut().for_each(|(_, id)| give(&group, id));
+        tags.triangles.iter_mut().for_each(|(_, id)| give(&group, id));
+        // names of facets have a lower dimension, those of cells the greatest
+        let cells = if is_flat { 2 } else { 3 };
+        for (dimension, id, _) in &mut tags.names {
+            give(if *dimension == cells { &region } else { &group }, id);
         }
     }
 }
