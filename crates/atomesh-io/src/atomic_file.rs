@@ -94,9 +94,7 @@ fn temporary_in(folder: &Path) -> io::Result<NamedTempFile> {
 
 /// The error of a temporary file without its name, which is random and says nothing to the user.
 pub(crate) fn without_name(error: io::Error) -> io::Error {
-    let inner = error.get_ref().and_then(|e| e.source()?.downcast_ref::<io::Error>());
-    let code = inner.and_then(io::Error::raw_os_error);
-    code.map_or_else(|| error.kind().into(), io::Error::from_raw_os_error)
+    error.kind().into()
 }
 
 impl Write for AtomicFile {

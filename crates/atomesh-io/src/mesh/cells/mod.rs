@@ -1,7 +1,8 @@
 //! Files of polygons and polyhedra: VTU, OpenFOAM's polyMesh, lists of connections, and MODFLOW's grids.
 //!
 //! All hold world coordinates, and name cells, faces and points from 0 on in the mesh's order, so that a cell of
-//! one file is the cell of that number in the others.
+//! one file is the cell of that number in the others. Polyhedra of a VTU file stand in another order; its array `cell`
+//! has their numbers.
 
 pub(super) mod connections;
 mod foam;
