@@ -4,6 +4,7 @@ mod cell_exports;
 mod cell_files;
 mod flow_files;
 mod foam_mesh;
+mod hostile;
 mod image_bad_input;
 mod image_round_trip;
 mod mesh_files;
