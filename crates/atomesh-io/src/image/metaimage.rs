@@ -72,7 +72,8 @@ impl Entries {
                 continue;
             }
             // any text may be taken for a header: its lines are not told
-            let wrong_line = || wrong("a line", &format!("number {number}"), "\"Name = value\"");
+            let wrong_line =
+                || wrong("an entry", &format!("missing in line {number}"), "\"Name = value\"");
             let (name, value) = line.split_once('=').ok_or_else(wrong_line)?;
             let (name, value) = (name.trim().to_owned(), value.trim().to_owned());
             let is_last = name == LAST;

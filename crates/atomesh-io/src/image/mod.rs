@@ -1,8 +1,10 @@
 //! Image files: bytes to [`Image`] and back, one file per format.
 //!
 //! `table` lists the formats. A file's ending chooses one, and its first bytes must agree. Each reader
-//! checks what the header promises against the size of the file before it allocates memory, then streams
-//! the samples into the one vector that will hold them, in the file's own type.
+//! checks what the header promises against the size of the file, and against the memory that there is, before
+//! it allocates any, then streams the samples into the one vector that will hold them, in the file's own
+//! type. Headers may name files of samples beside them and below, and elsewhere where the caller allows it
+//! ([`ReadOptions::data_root`]); messages quote neither those files nor text that may be no header.
 //!
 //! | format | endings | samples | frame |
 //! | --- | --- | --- | --- |
@@ -149,14 +151,18 @@ fn load(
             return Err(ReadReason::UnknownExtension { extension: extension(path), known });
         }
     };
-    let mut file = File::open(path).map_err(ReadReason::Io)?;
-    let metadata = file.metadata().map_err(ReadReason::Io)?;
+    let metadata = path.metadata().map_err(ReadReason::Io)?;
     if metadata.is_dir() {
         return match &format.codec().folder {
             Some(folder) => (folder.read)(path, options, watch),
             None => Err(ReadReason::Io(std::io::ErrorKind::IsADirectory.into())),
         };
     }
+    if !metadata.is_file() {
+        // a pipe would keep us waiting, a device has no end
+        return Err(ReadReason::Io(std::io::Error::other("it is no plain file")));
+    }
+    let mut file = File::open(path).map_err(ReadReason::Io)?;
     let root = options.data_root.as_deref();
     let folders = path.parent().map(|own| DataFolders { own, root });
     let file = Stored { bytes: &mut file, length: metadata.len(), folders };

@@ -91,7 +91,11 @@ impl Payload {
         let unsupported =
             |found, expected| ReadReason::Unsupported { format: self.format, found, expected };
         let Some(folders) = folders else {
-            let found = format!("a header whose samples are in {} other files", names.len());
+            let first = names.first().map_or("", String::as_str);
+            let found = format!(
+                "a header whose samples are in {} files, the first of them {first:?}",
+                names.len()
+            );
             let expected = "samples after the header where there is no folder";
             return Err(unsupported(found, expected));
         };

@@ -5,6 +5,7 @@ mod cell_files;
 mod cell_values;
 mod flow_files;
 mod foam_mesh;
+mod hostile;
 mod image_bad_input;
 mod image_round_trip;
 mod mesh_files;

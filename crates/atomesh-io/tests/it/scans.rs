@@ -464,7 +464,7 @@ fn what_a_meta_header_may_not_say_is_named() {
         ("TransformMatrix = 0.8", "TransformMatrix = 3", "meet at"),
         ("ElementDataFile = LOCAL", "Comment = none", "ElementDataFile is missing"),
         ("ElementDataFile = LOCAL", "ElementDataFile = a%d 3 1", "a pattern"),
-        ("NDims = 3", "three dimensions", "line is three dimensions"),
+        ("NDims = 3", "three dimensions", "an entry is missing in line 2"),
         ("BinaryData = True", "CompressedData = True", "corrupt"),
     ] {
         let text = with(from, to);

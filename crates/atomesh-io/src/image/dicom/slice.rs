@@ -246,8 +246,8 @@ fn check_syntax(syntax: &str) -> Result<bool, ReadReason> {
     ))
 }
 
-/// Unpacks a frame of run lengths (PS3.5, annex G) to samples with the least byte first, into all of `bytes`. There is a
-/// segment for each byte of a sample, the most significant first.
+/// Unpacks a frame of run lengths (PS3.5, annex G) to samples with the least byte first, into all of
+/// `bytes`. There is a segment for each byte of a sample, the most significant first.
 fn unpack_runs(packed: &[u8], mut bytes: Vec<u8>, size: usize) -> Result<Vec<u8>, ReadReason> {
     let whole = bytes.len();
     let bad =

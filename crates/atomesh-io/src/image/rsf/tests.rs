@@ -85,6 +85,8 @@ fn the_last_value_of_a_key_counts_and_files_may_have_moved() {
     std::fs::write(&path, text).unwrap();
     let loaded = load_image(&path, &ReadOptions::default(), &mut Silent).unwrap();
     assert_eq!(loaded.image.shape(), [2, 3]);
+    let beside = |note: &ReadNote| matches!(note, ReadNote::DataBeside { .. });
+    assert!(loaded.notes.iter().any(beside), "{:?}", loaded.notes);
     std::fs::write(&path, text.replace("a.rsf@", "gone")).unwrap();
     let error = load_image(&path, &ReadOptions::default(), &mut Silent).unwrap_err().to_string();
     assert!(error.contains("a.rsf") && error.contains("/no/such/place/gone"), "{error}");

@@ -95,10 +95,8 @@ impl Lattice {
     /// The trace that is farthest off its place, and how far it is off.
     pub fn worst(&self, traces: &[Located]) -> (usize, f64) {
         let off = |t: &Located| (t.trace, length(difference(t.position, self.at(t.indices))));
-        traces
-            .iter()
-            .map(off)
-            .fold((0, 0.0), |worst, next| if next.1 > worst.1 { next } else { worst })
+        let farthest = traces.iter().map(off).max_by(|a, b| a.1.total_cmp(&b.1));
+        farthest.unwrap_or((0, 0.0))
     }
 
     /// The angle between the steps, in degrees.

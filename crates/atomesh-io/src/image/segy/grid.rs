@@ -33,16 +33,15 @@ impl Grid {
         let lattice = turned_as_file(lattice(&positions)?, &positions)?;
         let traces = located(coordinates, &lattice);
         let [x, y] = lattice.steps.map(length);
-        if lattice.worst(&traces).1 > tolerance(x.min(y), coordinates) {
-            return None;
-        }
+        // steps that are parallel give no number
+        let fits = lattice.worst(&traces).1 <= tolerance(x.min(y), coordinates);
         let bounds = |axis: usize| {
             let indices = || traces.iter().map(|t| t.indices[axis]);
             (indices().fold(f64::INFINITY, f64::min), indices().fold(f64::NEG_INFINITY, f64::max))
         };
         let [(left, right), (low, high)] = [bounds(0), bounds(1)];
-        let shape = [right - left, high - low].map(|n| n as usize + 1);
-        if !is_told(shape, traces.len()) {
+        let shape = [right - left, high - low].map(|n| (n as usize).saturating_add(1));
+        if !fits || !is_told(shape, traces.len()) {
             return None;
         }
         let place = |t: &Located| {

@@ -2,9 +2,10 @@
 //!
 //! Definition: SEG Technical Standards Committee, *SEG-Y revision 2.0 Data Exchange format*, 2017;
 //! Barry, Cavers & Kneale 1975. Order of the work: the file's header and its size give the traces'
-//! length and number; all trace headers are read, the samples skipped; their numbers arrange the
-//! traces, their coordinates place the grid; then samples are read once, in blocks, into the vector
-//! that will hold them; those of missing and dead traces are 0, and told from others by a mask.
+//! length and number; all trace headers are read, the samples skipped; their numbers, or else their
+//! coordinates, arrange the traces; their coordinates place the grid; then samples are read once, in
+//! blocks, into the vector that will hold them. Those of missing and dead traces are 0, and told from
+//! others by a mask.
 //!
 //! Axes: in a cube x runs along the crossline numbers, y along the inline numbers; on a line x runs
 //! along the line. The last axis is the sample number, downwards. World coordinates are X and Y of
