@@ -147,6 +147,9 @@ fn mesh_text<const D: usize>(
         line(&mut text, "image", format_args!("{} samples", list(&frame.shape())));
     }
     if let Some(provenance) = &loaded.provenance {
+        if !provenance.units.is_empty() {
+            line(&mut text, "units", provenance.units.join(","));
+        }
         line(&mut text, "made by", format_args!("atomesh {}", provenance.version));
         line(&mut text, "seed", provenance.seed);
         line(&mut text, "options", &provenance.options);

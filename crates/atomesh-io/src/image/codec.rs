@@ -22,6 +22,8 @@ pub(super) struct Codec {
     pub begins: Begins,
     /// Whether files say where their samples are in the world.
     pub has_frame: bool,
+    /// Whether only some of them do.
+    pub frame_is_optional: bool,
     /// Whether the world's z axis points up.
     pub z_is_height: bool,
     /// Whether the writer takes floats.
@@ -42,6 +44,7 @@ impl Codec {
             header_endings: &[],
             begins: Begins::Anyhow,
             has_frame: false,
+            frame_is_optional: false,
             z_is_height: false,
             writes_floats: false,
             read,
@@ -86,7 +89,7 @@ pub(super) type Writer =
 pub(super) struct Folder {
     /// Whether the file at a path is one of such a folder, whatever its name is.
     pub is_part: fn(&Path) -> bool,
-    pub read: fn(&Path, &mut dyn Watch) -> Result<LoadedImage, ReadReason>,
+    pub read: fn(&Path, &ReadOptions, &mut dyn Watch) -> Result<LoadedImage, ReadReason>,
 }
 
 /// Bytes that can be read from any place.

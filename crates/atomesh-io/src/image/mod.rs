@@ -7,7 +7,7 @@
 //! | format | endings | samples | frame |
 //! | --- | --- | --- | --- |
 //! | PNG, JPEG, PNM | png, jpg jpeg, pgm ppm pbm pnm pam | 8 and 16 bits; colour to luminance | none |
-//! | TIFF | tif tiff | integers, floats; many pages are a volume | none |
+//! | TIFF | tif tiff | integers, floats; many pages are a volume, or a stack of channels and times | spacing |
 //! | NPY | npy | every real type; arrays (y, x) or (z, y, x) | none |
 //! | NIfTI-1 | nii nii.gz | every real type; one volume | sform, else qform, else spacing |
 //! | DICOM | a folder of slices, dcm | integers, rescaled to float32 | LPS turned to RAS |
@@ -36,8 +36,19 @@
 //! Meshes and images are written in the same coordinates: NIfTI and NRRD say RAS, VTI and mesh formats
 //! have no word for it. Flat images of NRRD and MetaImage stand as they are, unless they name a body.
 //!
-//! An image without a frame has unit spacing and origin 0: the resolution that a PNG, JPEG or TIFF
-//! states is one of printing.
+//! An image without a frame has unit spacing and origin 0: the resolution that a PNG or JPEG states is one of printing.
+//! That of a TIFF counts, unless it is one that software writes unasked: 72, 96, 150, 300 or 600 an inch.
+//!
+//! Units are the file's own: micrometres stay micrometres. [`LoadedImage::units`] names them where the file does: `um`
+//! of most micrographs, `mm` of DICOM, what NIfTI states.
+//!
+//! | values | as brightness | as labels ([`Meaning`]) |
+//! | --- | --- | --- |
+//! | colour | luminance | refused; or a label a colour, black 0, others from 1 by ascending red, green, blue |
+//! | palette | of its colours (PNG), refused (TIFF) | the indices |
+//! | grey of 1, 2 or 4 bits (PNG, TIFF), PNM of another greatest value | stretched to 8 or 16 bits | as stored |
+//! | PBM | black 0, white 255 | black 0, white 1 |
+//! | TIFF with 0 for white | turned round | as stored |
 
 use std::cell::Cell;
 use std::fs::File;
@@ -57,6 +68,7 @@ mod dicom;
 mod error;
 mod format;
 mod jpeg;
+mod length;
 mod metaimage;
 mod nifti;
 mod note;
@@ -86,8 +98,11 @@ pub use any_image::AnyImage;
 use codec::{Input, Source};
 pub use error::{ReadError, ReadReason, WriteError, WriteReason};
 pub use format::ImageFormat;
+pub use length::metres;
 pub use note::{LoadedImage, ReadNote};
-pub use options::{RawLayout, ReadOptions, SegyOptions, Vertical};
+pub use options::{
+    GivenFrame, Meaning, RawLayout, ReadOptions, SegyOptions, StackOptions, Vertical,
+};
 pub use sample_type::{ByteOrder, SampleType, UnknownByteOrder, UnknownSampleType};
 pub use series_error::SeriesError;
 use table::extension;
@@ -148,7 +163,9 @@ fn load(
     let metadata = file.metadata().map_err(ReadReason::Io)?;
     if metadata.is_dir() {
         return match &format.codec().folder {
-            Some(folder) => (folder.read)(path, watch),
+            Some(folder) => {
+                (folder.read)(path, options, watch).map(|loaded| wanted(loaded, options))
+            }
             None => Err(ReadReason::Io(std::io::ErrorKind::IsADirectory.into())),
         };
     }
@@ -209,7 +226,31 @@ fn decode(
     let bytes: &mut dyn Input = bytes; // no longer than the watch
     let bytes = Watched::new(bytes, length, watch, &cancelled);
     let loaded = (codec.read)(Source { bytes, length, folder, options });
-    if cancelled.get() { Err(Cancelled.into()) } else { loaded }
+    if cancelled.get() { Err(Cancelled.into()) } else { loaded.map(|l| wanted(l, options)) }
+}
+
+/// What was read, with notes on options that it did not meet. A spacing that the caller gives is in units of the
+/// caller, and what the file says of its own does not count.
+fn wanted(mut loaded: LoadedImage, options: &ReadOptions) -> LoadedImage {
+    if options.given.spacing {
+        loaded.units.clear();
+        loaded.notes.retain(|note| !note.is_about_spacing());
+    }
+    let notes = &mut loaded.notes;
+    let has_colours = notes.iter().any(|note| matches!(note, ReadNote::ColourLabels { .. }));
+    if options.meaning == Meaning::LabelsByColour && !has_colours {
+        notes.push(ReadNote::NoColours);
+    }
+    let StackOptions { channel, time } = options.stack;
+    for (name, wanted) in [("channel", channel), ("time", time)] {
+        let is_said = |note: &ReadNote| matches!(note, ReadNote::Chosen { axis, .. } | ReadNote::OnePlane { axis, .. } if *axis == name);
+        if let Some(wanted) = wanted.filter(|&n| n > 1)
+            && !notes.iter().any(is_said)
+        {
+            notes.push(ReadNote::OnePlane { axis: name, wanted });
+        }
+    }
+    loaded
 }
 
 /// Writes an image in the format that the file's name promises: NPY (array (y, x) or (z, y, x)),

@@ -13,7 +13,7 @@ mod write;
 
 pub use figures::{Figures, Measured};
 pub(crate) use inputs::shown;
-pub use inputs::{MeshImages, read_shown};
+pub use inputs::{MeshImages, ShownImage, read_shown};
 pub(crate) use refusal::refusal;
 pub use write::Tagged;
 
@@ -22,7 +22,7 @@ use std::path::{Path, PathBuf};
 use atomesh::image::Image;
 use atomesh::improve::ImproveReport;
 use atomesh::run::{Estimate, Outcome, Prepared};
-use atomesh_io::image::AnyImage;
+use atomesh_io::image::{AnyImage, LoadedImage};
 
 use crate::dimension::Dimension;
 use crate::error::JobError;
@@ -138,9 +138,14 @@ pub fn mesh_file(
     let outputs = Outputs::new(&run, options.write_config)?;
     outputs.check(&run, session)?;
     let work = FileRun { run: &run, outputs: &outputs, options };
-    match read_shown(&run, session)? {
-        AnyImage::Flat(image) => work.run(image, &Dimension::plane(), session),
-        AnyImage::Volume(image) => work.run(image, &Dimension::space(), session),
+    let LoadedImage { image, units, .. } = read_shown(&run, session)?;
+    match image {
+        AnyImage::Flat(image) => {
+            work.run(ShownImage { image, units }, &Dimension::plane(), session)
+        }
+        AnyImage::Volume(image) => {
+            work.run(ShownImage { image, units }, &Dimension::space(), session)
+        }
     }
 }
 
@@ -151,9 +156,14 @@ pub fn mesh_file(
 pub fn expect(mut run: RunConfig, session: &mut Session<'_>) -> Result<Expectation, JobError> {
     run.take_labels_alone();
     run.check()?;
-    match read_shown(&run, session)? {
-        AnyImage::Flat(image) => expect_image(&run, image, &Dimension::plane(), session),
-        AnyImage::Volume(image) => expect_image(&run, image, &Dimension::space(), session),
+    let LoadedImage { image, units, .. } = read_shown(&run, session)?;
+    match image {
+        AnyImage::Flat(image) => {
+            expect_image(&run, ShownImage { image, units }, &Dimension::plane(), session)
+        }
+        AnyImage::Volume(image) => {
+            expect_image(&run, ShownImage { image, units }, &Dimension::space(), session)
+        }
     }
 }
 
@@ -162,7 +172,7 @@ const SECONDS_PER_ATOM: [f64; 2] = [5e-5, 1.2e-5];
 
 fn expect_image<const D: usize>(
     run: &RunConfig,
-    image: Image<D>,
+    image: ShownImage<D>,
     dimension: &Dimension<D>,
     session: &mut Session<'_>,
 ) -> Result<Expectation, JobError> {
@@ -187,12 +197,13 @@ struct FileRun<'a> {
 impl FileRun<'_> {
     fn run<const D: usize>(
         &self,
-        image: Image<D>,
+        image: ShownImage<D>,
         dimension: &Dimension<D>,
         session: &mut Session<'_>,
     ) -> Result<MeshSummary, JobError> {
         let (run, outputs) = (self.run, self.outputs);
         let images = MeshImages::read_fields(run, image, dimension, session)?;
+        let units = images.units.clone();
         let (prepared, image) = prepare(run, images, dimension, session)?;
         let image = outputs.needs_image().then_some(image);
         let outcome = meshed(run, prepared, session)?;
@@ -202,7 +213,7 @@ impl FileRun<'_> {
             _ => Measured::Nothing,
         };
         let figures = Figures::new(run, &outcome, measured, dimension.tools, session)?;
-        let writing = Writing { run, outputs, outcome: &outcome, dimension };
+        let writing = Writing { run, outputs, outcome: &outcome, units: &units, dimension };
         let tagged = session.writing(|session| -> Result<_, JobError> {
             let tagged = writing.write(image.as_ref(), session)?;
             self.write_about(&writing, image.as_ref(), &figures, session)?;
@@ -221,7 +232,7 @@ impl FileRun<'_> {
         figures: &Figures,
         session: &mut Session<'_>,
     ) -> Result<(), JobError> {
-        let Writing { run, outputs, outcome, dimension } = *writing;
+        let Writing { run, outputs, outcome, dimension, .. } = *writing;
         if let Some(path) = &outputs.config {
             write_bytes(path, run.clone().with_defaults::<D>().to_toml()?.as_bytes())?;
         }

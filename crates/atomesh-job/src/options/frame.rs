@@ -1,14 +1,17 @@
 //! Images as options describe them: frame, box of interest, raw layout.
 
 use atomesh::image::{Frame, FrameError, Image};
-use atomesh_io::image::{ByteOrder, RawLayout, ReadOptions, SampleType, SegyOptions, Vertical};
+use atomesh_io::image::{
+    ByteOrder, GivenFrame, Meaning, RawLayout, ReadOptions, SampleType, SegyOptions, StackOptions,
+    Vertical,
+};
 use serde::{Deserialize, Serialize};
 
 use super::section::section;
 use crate::error::JobError;
 use crate::values::{Counts, Numbers, Text, WorldBox};
 #[cfg(feature = "clap")]
-use crate::values::{named, number_in};
+use crate::values::{count_in, named, number_in};
 
 /// Which byte of a number comes first.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
@@ -42,6 +45,17 @@ section! {
         #[arg(long, value_name = "VALUE", allow_hyphen_values = true,
             value_parser = number_in(f64::MIN, f64::MAX, "a finite number"))]
         pub fill: f64,
+        /// TIFF stacks of several channels: which one, from 1, as ImageJ counts. Default: several are an error
+        #[arg(long, value_name = "N", value_parser = count_in(1, "a number from 1"))]
+        pub channel: usize,
+        /// TIFF stacks of several points of time: which one, from 1. Default: several are an error
+        #[arg(long, value_name = "N", value_parser = count_in(1, "a number from 1"))]
+        pub time: usize,
+        /// Colour images as labels: one for each colour, black 0, the others from 1 by ascending red, green, blue.
+        /// Default: false, colours are an error; grey values and indices of palettes are labels as they are
+        #[arg(long, value_name = "BOOL", num_args = 0..=1, require_equals = true,
+            default_missing_value = "true")]
+        pub labels_by_color: bool,
         /// Raw samples: how many along x, y (and z), x fastest in the file. A NumPy array of
         /// shape (nz, ny, nx) is NX,NY,NZ here
         #[arg(long, value_name = "NX,NY[,NZ]")]
@@ -107,7 +121,26 @@ impl FrameOptions {
             coordinate_bytes: pair("--coordinate-bytes", &self.coordinate_bytes)?,
             vertical: self.vertical,
         };
-        Ok(ReadOptions { raw: self.raw_layout()?, segy })
+        let stack = StackOptions { channel: self.channel, time: self.time };
+        if [stack.channel, stack.time].contains(&Some(0)) {
+            return Err(JobError::misuse("--channel and --time count from 1"));
+        }
+        let given = GivenFrame {
+            spacing: self.spacing.is_some(),
+            origin: self.origin.is_some(),
+            direction: self.direction.is_some(),
+        };
+        let raw = self.raw_layout()?;
+        Ok(ReadOptions { raw, segy, stack, given, meaning: Meaning::default() })
+    }
+
+    /// How images are read whose values mean that; labels go by colour if that is asked for.
+    pub fn read_options_for(&self, meaning: Meaning) -> Result<ReadOptions, JobError> {
+        let meaning = match meaning {
+            Meaning::Labels if self.labels_by_color == Some(true) => Meaning::LabelsByColour,
+            other => other,
+        };
+        Ok(ReadOptions { meaning, ..self.read_options()? })
     }
 
     /// The frame with what the options override.

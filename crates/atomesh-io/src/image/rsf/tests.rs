@@ -20,7 +20,7 @@ fn file(text: &str, shape: [usize; 3], encode: fn(f32) -> [u8; 4]) -> Vec<u8> {
 
 fn load(bytes: &[u8], vertical: Option<Vertical>) -> Result<LoadedImage, ReadReason> {
     let segy = SegyOptions { vertical, ..SegyOptions::default() };
-    load_bytes(bytes, FORMAT, &ReadOptions { segy, raw: None }, &mut Silent)
+    load_bytes(bytes, FORMAT, &ReadOptions { segy, ..ReadOptions::default() }, &mut Silent)
 }
 
 fn value(image: &AnyImage, index: [usize; 3]) -> f32 {

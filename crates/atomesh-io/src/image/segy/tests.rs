@@ -111,7 +111,7 @@ impl Writer {
 
     fn load(&self, options: &SegyOptions) -> Result<LoadedImage, ReadReason> {
         let bytes = self.bytes();
-        let options = ReadOptions { segy: *options, raw: None };
+        let options = ReadOptions { segy: *options, ..ReadOptions::default() };
         load_bytes(&bytes, FORMAT, &options, &mut Silent)
     }
 
