@@ -7,7 +7,7 @@ use atomesh::image::{Image, Samples, Units};
 use atomesh::mesh::Mesh;
 use atomesh::watch::{Phase, check};
 use atomesh_draw::{Picture, Style};
-use atomesh_io::image::AnyImage;
+use atomesh_io::image::{AnyImage, Meaning};
 
 use crate::dimension::Dimension;
 use crate::error::JobError;
@@ -99,7 +99,9 @@ pub fn enhance_file(
     let picture = PictureFile::of(request.picture.as_ref())?;
     let outputs = [Some(request.output.as_path()), request.picture.as_deref()];
     files::check_apart([request.image.as_path()], outputs.into_iter().flatten(), session)?;
-    match images::read(&request.image, &request.frame.read_options()?, session)? {
+    let meaning = if request.features.are_labels() { Meaning::Labels } else { Meaning::Brightness };
+    let options = request.frame.read_options_for(meaning)?;
+    match images::read(&request.image, &options, session)?.image {
         AnyImage::Flat(image) => {
             run(request, image, picture.as_ref(), &Dimension::plane(), session)
         }

@@ -5,15 +5,17 @@ use std::path::Path;
 use atomesh::image::{Frame, Image};
 use atomesh::watch::Watch;
 use atomesh_io::image::{
-    AnyImage, ImageFormat, LoadedImage, ReadError, ReadNote, ReadOptions, ReadReason, SampleFormat,
-    load_image,
+    ImageFormat, LoadedImage, Meaning, ReadError, ReadNote, ReadOptions, ReadReason, SampleFormat,
+    SeriesError, load_image, metres,
 };
+use atomesh_io::mesh::Provenance;
 
 use crate::dimension::Dimension;
 use crate::error::JobError;
+use crate::labels;
 use crate::memory;
 use crate::options::FrameOptions;
-use crate::session::{Note, Session};
+use crate::session::{Note, NoteKind, Session};
 
 /// Reads an image, unless its file alone is larger than the memory available.
 ///
@@ -49,13 +51,27 @@ fn refusal(error: ReadError) -> JobError {
         }
         ReadReason::TraceFormat { .. } => JobError::content(&reason)
             .advise("--sample-format says how samples are written, if the header does not"),
+        ReadReason::ColourLabels { .. } => JobError::content(&reason)
+            .advise("--labels-by-color makes a label of each colour"),
+        ReadReason::Stack { channels, times, .. } => {
+            let part = |name: &str, count: usize| format!("--{name} N, 1 to {count}");
+            let parts = [("channel", channels), ("time", times)].into_iter();
+            let parts: Vec<_> = parts.filter(|(_, n)| *n > 1).map(|(s, n)| part(s, n)).collect();
+            JobError::misuse(&reason).advise(format!("{}, chooses one", parts.join(" and ")))
+        }
+        ReadReason::Series(ref series) if matches!(**series, SeriesError::Missing { .. }) => {
+            JobError::content(&reason).advise(
+                "--spacing SX,SY,SZ gives the spacing, and puts slices without a position in the order of \
+                 their instance numbers; --origin and --direction place them",
+            )
+        }
         ReadReason::RawSize { .. } | ReadReason::RawShape { .. } => JobError::misuse(&reason),
         _ => JobError::content(&reason),
     }
     .about(&path)
 }
 
-/// Reads an image; what its reader took for granted becomes notes.
+/// Reads an image; what its reader took for granted becomes notes. Labels near to whole numbers are rounded.
 ///
 /// # Errors
 /// As [`load`].
@@ -63,12 +79,49 @@ pub fn read(
     path: &Path,
     options: &ReadOptions,
     session: &mut Session<'_>,
-) -> Result<AnyImage, JobError> {
-    let loaded = load(path, options, session)?;
-    for note in &loaded.notes {
-        session.note(Note { kind: note.into(), file: Some(path.into()), text: words(note) });
+) -> Result<LoadedImage, JobError> {
+    let mut loaded = load(path, options, session)?;
+    let said = loaded.notes.iter().map(|note| (note.into(), words(note)));
+    let mut said: Vec<(NoteKind, String)> = said.collect();
+    if matches!(options.meaning, Meaning::Labels | Meaning::LabelsByColour) {
+        let (image, odd) = labels::whole(loaded.image)?;
+        loaded.image = image;
+        let kind = |odd: bool| if odd { NoteKind::Warning } else { NoteKind::Change };
+        said.extend(odd.into_iter().map(|odd| (kind(odd.is_warning()), odd.text())));
     }
-    Ok(loaded.image)
+    for (kind, text) in said {
+        let note = Note { kind, file: Some(path.into()), text };
+        // a file that is read twice says the same
+        if !session.notes().contains(&note) {
+            session.note(note);
+        }
+    }
+    Ok(loaded)
+}
+
+/// How long a unit is in another, if both are known lengths and differ.
+pub(crate) fn unit_ratio(units: &[String], others: &[String]) -> Option<(f64, String)> {
+    let one = |units: &[String]| {
+        let first = units.first()?;
+        units.iter().all(|unit| unit == first).then(|| first.clone())
+    };
+    let (unit, other) = (one(units)?, one(others)?);
+    let ratio = metres(&unit)? / metres(&other)?;
+    (unit != other).then(|| (ratio, format!("coordinates are turned from {unit} to {other}")))
+}
+
+/// A frame in a unit so much smaller than its own.
+pub(crate) fn scaled<const D: usize>(frame: &Frame<D>, ratio: f64) -> Result<Frame<D>, JobError> {
+    let spacing = frame.spacing().map(|s| s * ratio);
+    let origin = frame.origin().map(|x| x * ratio);
+    let placed = frame.with_spacing(spacing).and_then(|frame| frame.with_origin(origin));
+    placed.map_err(JobError::content)
+}
+
+/// Whether a file says where its samples are: a frame of unit steps at 0 is that of headers that say nothing.
+pub(crate) fn is_placed<const D: usize>(path: &Path, frame: &Frame<D>) -> bool {
+    let unit = Frame::new(frame.shape());
+    ImageFormat::of(path).is_some_and(ImageFormat::has_frame) && unit.as_ref() != Ok(frame)
 }
 
 /// A reader's note, with the option that decides otherwise where there is one.
@@ -101,6 +154,8 @@ pub enum ImageRole {
 pub struct Beside<'a, const D: usize> {
     /// The frame of the image that the mesh follows, if it is known; for images of its shape.
     pub frame: Option<&'a Frame<D>>,
+    /// The mesh's provenance, which knows the units of the world.
+    pub provenance: Option<&'a Provenance>,
     /// The options of the frame, which go before all.
     pub options: &'a FrameOptions,
     /// What the image is to the mesh.
@@ -108,7 +163,7 @@ pub struct Beside<'a, const D: usize> {
 }
 
 impl<const D: usize> Beside<'_, D> {
-    /// Reads the image and places it.
+    /// Reads an image of grey values and places it.
     ///
     /// # Errors
     /// [`JobError`] as [`load`], and if the image has another dimension or the options do not fit it.
@@ -118,13 +173,35 @@ impl<const D: usize> Beside<'_, D> {
         dimension: &Dimension<D>,
         session: &mut Session<'_>,
     ) -> Result<Image<D>, JobError> {
-        let any = read(path, &self.options.read_options()?, session)?;
+        self.read_as(Meaning::Brightness, path, dimension, session)
+    }
+
+    /// Reads an image whose values mean that, and places it.
+    ///
+    /// # Errors
+    /// As [`read`](Self::read).
+    pub fn read_as(
+        &self,
+        meaning: Meaning,
+        path: &Path,
+        dimension: &Dimension<D>,
+        session: &mut Session<'_>,
+    ) -> Result<Image<D>, JobError> {
+        let LoadedImage { image: any, units, .. } =
+            read(path, &self.options.read_options_for(meaning)?, session)?;
         let axes = any.dimension();
-        let Some(image) = (dimension.image)(any) else {
+        let Some(mut image) = (dimension.image)(any) else {
             let message = format!("has {axes} axes; the mesh is made of {}", dimension.cells);
             return Err(JobError::content(message).about(path));
         };
-        let has_frame = ImageFormat::of(path).is_some_and(ImageFormat::has_frame);
+        let own = *image.frame();
+        let format = ImageFormat::of(path);
+        let has_frame = format.is_some_and(ImageFormat::always_has_frame) || is_placed(path, &own);
+        let world = self.provenance.map_or(&[][..], |provenance| &provenance.units);
+        if let Some((ratio, text)) = unit_ratio(&units, world).filter(|_| has_frame) {
+            image = image.with_frame(scaled(&own, ratio)?).map_err(JobError::content)?;
+            session.note(Note { is_warning: false, file: Some(path.into()), text });
+        }
         self.place(image, has_frame).map_err(|e| e.about(path))
     }
 

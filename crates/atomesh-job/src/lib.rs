@@ -56,6 +56,7 @@ pub mod features;
 pub mod files;
 pub mod flow;
 pub mod images;
+mod labels;
 pub mod measure;
 pub mod memory;
 pub mod mesh;

@@ -8,6 +8,7 @@ use atomesh::measure::WantedSize;
 use atomesh::mesh::Mesh;
 use atomesh::run::MeshReport;
 use atomesh_draw::Style;
+use atomesh_io::image::Meaning;
 use atomesh_io::mesh::LoadedMesh;
 use serde::Serialize;
 use serde_json::Value;
@@ -175,11 +176,12 @@ fn run<const D: usize>(
     session: &mut Session<'_>,
 ) -> Result<MeshReport, JobError> {
     let (frame, options) = (loaded.frame.as_ref(), &request.frame);
-    let beside = Beside { frame, options, role: ImageRole::Followed };
-    let mut read = |path: &Path| beside.read(path, dimension, session);
-    let potential = read(&request.potential)?;
-    let image = request.image.as_deref().map(&mut read).transpose()?;
-    let labels = request.labels.as_deref().map(&mut read).transpose()?;
+    let provenance = loaded.provenance.as_ref();
+    let beside = Beside { frame, provenance, options, role: ImageRole::Followed };
+    let mut read = |path: &Path, meaning| beside.read_as(meaning, path, dimension, session);
+    let potential = read(&request.potential, Meaning::Brightness)?;
+    let image = request.image.as_deref().map(|path| read(path, Meaning::Brightness)).transpose()?;
+    let labels = request.labels.as_deref().map(|path| read(path, Meaning::Labels)).transpose()?;
     let against = Against::potential(potential).map_err(|e| e.about(&request.potential))?;
     let against = Against { image, labels, ..against };
     let report = measure(request, loaded, &against, dimension, session)?;

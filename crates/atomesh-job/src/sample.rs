@@ -9,6 +9,7 @@ use std::str::FromStr;
 
 use atomesh::image::Image;
 use atomesh::sample::{SampleOptions, Statistic};
+use atomesh_io::image::Meaning;
 use atomesh_io::mesh::Values;
 
 use crate::dimension::Dimension;
@@ -57,6 +58,15 @@ fn statistic() -> impl clap::builder::TypedValueParser<Value = Statistic> {
 }
 
 impl SampleRequest {
+    /// What samples mean: labels, where all that is computed are shares of them.
+    fn meaning(&self) -> Meaning {
+        let of_labels = |s: &Statistic| matches!(s, Statistic::Majority | Statistic::Homogeneity);
+        match self.statistics().iter().all(of_labels) {
+            true => Meaning::Labels,
+            false => Meaning::Brightness,
+        }
+    }
+
     fn statistics(&self) -> &[Statistic] {
         if self.statistic.is_empty() { &[Statistic::Mean] } else { &self.statistic }
     }
@@ -215,8 +225,9 @@ fn run<const D: usize>(
     let mut found = Vec::new();
     for named in &request.image {
         let (frame, options) = (loaded.frame(), &request.frame);
-        let beside = Beside { frame, options, role: ImageRole::Property };
-        let image = beside.read(&named.path, dimension, session)?;
+        let provenance = loaded.provenance();
+        let beside = Beside { frame, provenance, options, role: ImageRole::Property };
+        let image = beside.read_as(request.meaning(), &named.path, dimension, session)?;
         found.extend(sample(request, named, &loaded, &image, dimension, session)?);
     }
     let old = loaded.take_fields().into_iter();

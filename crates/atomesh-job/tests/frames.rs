@@ -4,8 +4,8 @@ use std::path::{Path, PathBuf};
 
 use atomesh::image::{Frame, Image, Samples, Units};
 use atomesh::watch::Silent;
-use atomesh_io::image::write_image;
-use atomesh_job::mesh::MeshImages;
+use atomesh_io::image::{AnyImage, LoadedImage, write_image};
+use atomesh_job::mesh::{MeshImages, ShownImage};
 use atomesh_job::options::{InputOptions, RunConfig};
 use atomesh_job::{Dimension, ErrorKind, JobError, Session};
 
@@ -63,7 +63,9 @@ impl Case {
         let mut watch = Silent;
         let mut session = Session::new(&mut watch);
         let image = atomesh_job::mesh::read_shown(&run, &mut session)?;
-        let atomesh_io::image::AnyImage::Volume(image) = image else { panic!() };
+        let LoadedImage { image, units, .. } = image;
+        let AnyImage::Volume(image) = image else { panic!() };
+        let image = ShownImage { image, units };
         let images = MeshImages::read_fields(&run, image, &Dimension::space(), &mut session)?;
         let notes = session.notes().iter().map(ToString::to_string).collect();
         Ok((images.labels.unwrap(), notes))
@@ -141,4 +143,47 @@ fn labels_without_a_frame_are_taken_by_their_shape() {
     let path = case.write("short.npy", &ball(frame([16, 14, 11], [0.0; 3])));
     let text = case.read(&path, |_| {}).unwrap_err().to_string();
     assert!(text.contains("[16, 14, 11]") && text.contains("[16, 14, 12]"), "{text}");
+}
+
+/// A NIfTI file of the image with a unit in its header: 2 is mm, 3 is um.
+fn with_unit(path: &Path, code: u8) {
+    let mut bytes = std::fs::read(path).unwrap();
+    bytes[123] = code;
+    std::fs::write(path, bytes).unwrap();
+}
+
+#[test]
+fn labels_in_another_unit_lie_in_the_same_place() {
+    let case = Case::new();
+    let own = frame([16, 14, 12], [-8.0, -6.0, -5.0]);
+    let expected = ball(own);
+    let image = case.write("image.nii", &expected);
+    with_unit(&image, 2);
+    let micrometres = own.with_spacing([1000.0; 3]).unwrap();
+    let micrometres = micrometres.with_origin([-8000.0, -6000.0, -5000.0]).unwrap();
+    let labels = Image::new(micrometres, expected.samples().clone()).unwrap();
+    let path = case.write("labels.nii", &labels);
+    with_unit(&path, 3);
+    let take = |run: &mut RunConfig| run.input.image = Some(image.clone());
+    let (labels, notes) = case.read(&path, take).unwrap();
+    assert_eq!(labels.samples(), expected.samples());
+    let note = "note: FILE: coordinates are turned from um to mm"
+        .replace("FILE", &path.display().to_string());
+    assert_eq!(notes, [note]);
+}
+
+#[test]
+fn labels_a_rounding_off_are_rounded_and_the_note_says_how_far() {
+    let case = Case::new();
+    let whole = ball(frame([16, 14, 12], [-8.0, -6.0, -5.0]));
+    let off = |by: f32| {
+        let samples = whole.samples().to_f32().iter().map(|v| v * (1.0 - by)).collect();
+        case.write("labels.nrrd", &Image::new(*whole.frame(), Samples::F32(samples)).unwrap())
+    };
+    let (labels, notes) = case.read(&off(2e-4), |_| {}).unwrap();
+    assert_eq!(labels.samples().to_f32(), whole.samples().to_f32());
+    assert!(matches!(&notes[..], [note] if note.contains("up to 2.0e-4 from whole")), "{notes:?}");
+    let (labels, notes) = case.read(&off(2e-3), |_| {}).unwrap();
+    assert_ne!(labels.samples().to_f32(), whole.samples().to_f32());
+    assert!(notes.is_empty(), "{notes:?}");
 }

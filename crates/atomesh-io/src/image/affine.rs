@@ -7,6 +7,7 @@ use super::any_image::AnyImage;
 use super::error::ReadReason;
 use super::format::ImageFormat;
 use super::note::ReadNote;
+use super::options::GivenFrame;
 
 /// The greatest |cosine| of the angle between two axes that a [`Frame`] tolerates, 0.006 degrees off; beyond
 /// it they are sheared.
@@ -48,6 +49,25 @@ impl Affine {
         let matrix =
             std::array::from_fn(|r| std::array::from_fn(|c| if r == c { spacing[c] } else { 0.0 }));
         Self { matrix, origin: [0.0; 3] }
+    }
+
+    /// The same, sound where the caller puts something else in its place, so that nothing is refused there: axes along
+    /// the world's where directions are given, and steps of 1 where spacing is given and there is none.
+    pub fn with_given(mut self, given: GivenFrame) -> Self {
+        let column = |c: usize| -> [f64; 3] { std::array::from_fn(|r| self.matrix[r][c]) };
+        let columns = [0, 1, 2].map(column);
+        for (c, column) in columns.iter().enumerate() {
+            let length = dot(column, column).sqrt();
+            let is_step = length.is_finite() && length > 0.0;
+            if given.direction || given.spacing && !is_step {
+                let step = if given.spacing && !is_step { 1.0 } else { length };
+                (0..3).for_each(|r| self.matrix[r][c] = if r == c { step } else { 0.0 });
+            }
+        }
+        if given.origin {
+            self.origin = self.origin.map(|x| if x.is_finite() { x } else { 0.0 });
+        }
+        self
     }
 
     /// The same samples in our world. LPS is RAS turned by half about z, so that nothing is mirrored.

@@ -24,6 +24,8 @@ pub(super) struct Codec {
     pub begins: Begins,
     /// Whether files say where their samples are in the world.
     pub has_frame: bool,
+    /// Whether only some of them do.
+    pub frame_is_optional: bool,
     /// Whether the world's z axis points up.
     pub z_is_height: bool,
     /// Whether the writer takes floats.
@@ -44,6 +46,7 @@ impl Codec {
             header_endings: &[],
             begins: Begins::Anyhow,
             has_frame: false,
+            frame_is_optional: false,
             z_is_height: false,
             writes_floats: false,
             read,

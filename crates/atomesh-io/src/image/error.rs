@@ -131,6 +131,41 @@ pub enum ReadReason {
         /// The number of volumes.
         count: u64,
     },
+    /// Colours are to be labels.
+    #[error(
+        "{format} file holds colours; expected labels, as grey values or the indices of a palette"
+    )]
+    ColourLabels {
+        /// The format of the file.
+        format: ImageFormat,
+    },
+    /// A stack has several channels or times, and none of them was chosen, or one that is not there.
+    #[error(
+        "holds {channels} channels and {times} times of {shape} samples; expected one{}",
+        chosen(*.channel, *.time)
+    )]
+    Stack {
+        /// The channels.
+        channels: usize,
+        /// The points of time.
+        times: usize,
+        /// The samples of each along x, y (and z), as in `640 × 480`.
+        shape: String,
+        /// The channel asked for, from 1.
+        channel: Option<usize>,
+        /// The time asked for, from 1.
+        time: Option<usize>,
+    },
+    /// A description of a stack promises other planes than there are.
+    #[error("{source_text} promises {promised}; there are {found}")]
+    Planes {
+        /// The planes promised.
+        promised: String,
+        /// The planes that there are.
+        found: usize,
+        /// Which description, as in `the OME-XML`.
+        source_text: &'static str,
+    },
     /// The axes of the header's affine matrix are not at right angles.
     #[error(
         "the header's axes {first} and {second} meet at {degrees:.3} degrees; expected 90, since a \
@@ -294,6 +329,14 @@ fn beginning(head: &[u8]) -> String {
 /// What there is of memory.
 fn left(limit: Option<u64>) -> String {
     limit.map_or_else(String::new, |limit| format!(", of which {limit} are left"))
+}
+
+/// What was asked for, in the message of a stack.
+fn chosen(channel: Option<usize>, time: Option<usize>) -> String {
+    let part = |name: &str, number: Option<usize>| number.map(|n| format!("{name} {n}"));
+    let parts: Vec<_> =
+        [part("channel", channel), part("time", time)].into_iter().flatten().collect();
+    if parts.is_empty() { String::new() } else { format!(", not {}", parts.join(", ")) }
 }
 
 /// What the first bytes say about a file with the wrong name.

@@ -4,7 +4,6 @@
 
 use std::io::Read;
 
-use atomesh::image::Samples;
 use zune_jpeg::JpegDecoder;
 use zune_jpeg::zune_core::bytestream::ZCursor;
 use zune_jpeg::zune_core::colorspace::ColorSpace;
@@ -12,10 +11,11 @@ use zune_jpeg::zune_core::options::DecoderOptions;
 
 use super::any_image::AnyImage;
 use super::codec::{Begins, Codec, Source};
-use super::colour::grey;
+use super::colour::Values;
 use super::error::ReadReason;
 use super::format::ImageFormat;
-use super::note::LoadedImage;
+use super::note::{LoadedImage, ReadNote};
+use super::options::Meaning;
 use super::shape::plausible_count;
 
 const FORMAT: ImageFormat = ImageFormat::named("JPEG");
@@ -33,7 +33,7 @@ const DENSITY: u64 = 8 * 64 * 4;
 /// Bytes that the decoder may hold of a value: itself, and of progressive files its coefficient of two bytes.
 const BYTES_PER_VALUE: u128 = 3;
 
-/// Decodes a flat image, colour to luminance in place. The file is held whole meanwhile.
+/// Decodes a flat image. The file is held whole meanwhile.
 fn read(mut source: Source) -> Result<LoadedImage, ReadReason> {
     let memory = source.memory;
     memory.check(source.length.into())?;
@@ -58,8 +58,13 @@ fn read(mut source: Source) -> Result<LoadedImage, ReadReason> {
     let options = options.jpeg_set_out_colorspace(color);
     let mut decoder = JpegDecoder::new_with_options(ZCursor::new(&file[..]), options);
     decoder.decode_into(&mut samples).map_err(|e| ReadReason::decoder(FORMAT, e))?;
-    let samples = Samples::U8(grey(samples, color.num_components()));
-    Ok(AnyImage::frameless(&[width, height], samples)?.into())
+    let mut values = Values::new(FORMAT, source.options.meaning);
+    if values.meaning != Meaning::Brightness {
+        values.note(ReadNote::Lossy);
+    }
+    let samples = values.of(samples, color.num_components())?;
+    let (samples, notes) = values.finish(samples);
+    Ok(LoadedImage { notes, ..AnyImage::frameless(&[width, height], samples)?.into() })
 }
 
 #[cfg(test)]

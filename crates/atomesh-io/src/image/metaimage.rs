@@ -44,7 +44,7 @@ fn unsupported(found: String, expected: &'static str) -> ReadReason {
 
 /// Reads a `.mha` or `.mhd` file.
 fn read(source: Source) -> Result<LoadedImage, ReadReason> {
-    let Source { bytes: source, length: file_bytes, folders, memory, .. } = source;
+    let Source { bytes: source, length: file_bytes, folders, memory, options } = source;
     let mut source = BufReader::with_capacity(1 << 16, source);
     let mut lines = Lines::new(&mut source);
     let entries = Entries::read(&mut lines)?;
@@ -52,7 +52,7 @@ fn read(source: Source) -> Result<LoadedImage, ReadReason> {
     let payload = entries.payload()?;
     let affine = entries.affine(payload.shape.len())?;
     let read = || payload.read(source, rest, folders, memory);
-    let image = affine::image(FORMAT, &payload.shape, affine, read)?;
+    let image = affine::image(FORMAT, &payload.shape, affine.with_given(options.given), read)?;
     Ok(LoadedImage::from(image).noting(entries.world().note()))
 }
 

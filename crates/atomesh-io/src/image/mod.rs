@@ -9,7 +9,7 @@
 //! | format | endings | samples | frame |
 //! | --- | --- | --- | --- |
 //! | PNG, JPEG, PNM | png, jpg jpeg, pgm ppm pbm pnm pam | 8 and 16 bits; colour to luminance | none |
-//! | TIFF | tif tiff | integers, floats; many pages are a volume | none |
+//! | TIFF | tif tiff | integers, floats; many pages are a volume, or a stack of channels and times | spacing |
 //! | NPY | npy | every real type; arrays (y, x) or (z, y, x) | none |
 //! | NIfTI-1 | nii nii.gz | every real type; one volume | sform, else qform, else spacing |
 //! | DICOM | a folder of slices, dcm | integers, rescaled to float32 | LPS turned to RAS |
@@ -38,8 +38,19 @@
 //! Meshes and images are written in the same coordinates: NIfTI and NRRD say RAS, VTI and mesh formats
 //! have no word for it. Flat images of NRRD and MetaImage stand as they are, unless they name a body.
 //!
-//! An image without a frame has unit spacing and origin 0: the resolution that a PNG, JPEG or TIFF
-//! states is one of printing.
+//! An image without a frame has unit spacing and origin 0: the resolution that a PNG or JPEG states is one of printing.
+//! That of a TIFF counts, unless it is one that software writes unasked: 72, 96, 150, 300 or 600 an inch.
+//!
+//! Units are the file's own: micrometres stay micrometres. [`LoadedImage::units`] names them where the file does: `um`
+//! of most micrographs, `mm` of DICOM, what NIfTI states.
+//!
+//! | values | as brightness | as labels ([`Meaning`]) |
+//! | --- | --- | --- |
+//! | colour | luminance | refused; or a label a colour, black 0, others from 1 by ascending red, green, blue |
+//! | palette | of its colours (PNG), refused (TIFF) | the indices |
+//! | grey of 1, 2 or 4 bits (PNG, TIFF), PNM of another greatest value | stretched to 8 or 16 bits | as stored |
+//! | PBM | black 0, white 255 | black 0, white 1 |
+//! | TIFF with 0 for white | turned round | as stored |
 
 use std::cell::Cell;
 use std::fs::File;
@@ -60,6 +71,7 @@ mod dicom;
 mod error;
 mod format;
 mod jpeg;
+mod length;
 mod memory;
 mod metaimage;
 mod nifti;
@@ -91,9 +103,12 @@ use codec::{Input, Source};
 use detached::DataFolders;
 pub use error::{ReadError, ReadReason, WriteError, WriteReason};
 pub use format::ImageFormat;
+pub use length::metres;
 use memory::Memory;
 pub use note::{IntervalSource, LoadedImage, ReadNote};
-pub use options::{RawLayout, ReadOptions, SegyOptions, Vertical};
+pub use options::{
+    GivenFrame, Meaning, RawLayout, ReadOptions, SegyOptions, StackOptions, Vertical,
+};
 pub use sample_type::{ByteOrder, SampleType, UnknownByteOrder, UnknownSampleType};
 pub use series_error::SeriesError;
 use table::extension;
@@ -154,7 +169,9 @@ fn load(
     let metadata = path.metadata().map_err(ReadReason::Io)?;
     if metadata.is_dir() {
         return match &format.codec().folder {
-            Some(folder) => (folder.read)(path, options, watch),
+            Some(folder) => {
+                (folder.read)(path, options, watch).map(|loaded| wanted(loaded, options))
+            }
             None => Err(ReadReason::Io(std::io::ErrorKind::IsADirectory.into())),
         };
     }
@@ -223,7 +240,31 @@ fn decode(
     let bytes = Watched::new(bytes, length, watch, &cancelled);
     let memory = Memory::up_to(options.memory_limit);
     let loaded = (codec.read)(Source { bytes, length, folders, memory, options });
-    if cancelled.get() { Err(Cancelled.into()) } else { loaded }
+    if cancelled.get() { Err(Cancelled.into()) } else { loaded.map(|l| wanted(l, options)) }
+}
+
+/// What was read, with notes on options that it did not meet. A spacing that the caller gives is in units of the
+/// caller, and what the file says of its own does not count.
+fn wanted(mut loaded: LoadedImage, options: &ReadOptions) -> LoadedImage {
+    if options.given.spacing {
+        loaded.units.clear();
+        loaded.notes.retain(|note| !note.is_about_spacing());
+    }
+    let notes = &mut loaded.notes;
+    let has_colours = notes.iter().any(|note| matches!(note, ReadNote::ColourLabels { .. }));
+    if options.meaning == Meaning::LabelsByColour && !has_colours {
+        notes.push(ReadNote::NoColours);
+    }
+    let StackOptions { channel, time } = options.stack;
+    for (name, wanted) in [("channel", channel), ("time", time)] {
+        let is_said = |note: &ReadNote| matches!(note, ReadNote::Chosen { axis, .. } | ReadNote::OnePlane { axis, .. } if *axis == name);
+        if let Some(wanted) = wanted.filter(|&n| n > 1)
+            && !notes.iter().any(is_said)
+        {
+            notes.push(ReadNote::OnePlane { axis: name, wanted });
+        }
+    }
+    loaded
 }
 
 /// Writes an image in the format that the file's name promises: NPY (array (y, x) or (z, y, x)),

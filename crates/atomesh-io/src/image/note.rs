@@ -204,6 +204,96 @@ pub enum ReadNote {
     },
     /// Values are those of cells; the samples are their middles.
     Cells,
+    /// The indices of a palette are taken as values.
+    PaletteIndices {
+        /// Whether a mask is not what is seen: index 0, outside, is no black, and another index is.
+        is_black_elsewhere: bool,
+    },
+    /// Three colour channels are the same everywhere, and taken as one.
+    EqualChannels,
+    /// Each colour became a label.
+    ColourLabels {
+        /// The first labels with their colours as in `0 #000000`, ascending.
+        labels: Vec<(u32, String)>,
+        /// How many labels there are.
+        count: usize,
+    },
+    /// Labels by colour were asked for, and there are no colours.
+    NoColours,
+    /// The format's compression changes values.
+    Lossy,
+    /// 0 stands for white, and values are as they are stored.
+    WhiteIsZero,
+    /// The file says how large its samples are.
+    SampleSize {
+        /// World units from one sample to the next along each axis.
+        spacing: Vec<f64>,
+        /// The unit, empty if the file names none.
+        unit: String,
+        /// Where the file says it, as in `the ImageJ description`.
+        source: &'static str,
+    },
+    /// The file does not say how far apart its planes are.
+    NoPlaneSpacing {
+        /// What is taken.
+        spacing: f64,
+        /// The unit, empty if the file names none.
+        unit: String,
+    },
+    /// The resolution is one that software writes without having measured anything.
+    UsualResolution {
+        /// Samples an inch.
+        per_inch: f64,
+    },
+    /// Samples are not square, and the resolution has no unit.
+    OblongSamples {
+        /// Samples along x and y in the same length.
+        resolution: [f64; 2],
+    },
+    /// A channel or time was asked for, where there is one.
+    OnePlane {
+        /// `channel` or `time`.
+        axis: &'static str,
+        /// The number that was asked for.
+        wanted: usize,
+    },
+    /// One of several channels or times was read.
+    Chosen {
+        /// `channel` or `time`.
+        axis: &'static str,
+        /// Its number, from 1.
+        number: usize,
+        /// How many there are.
+        count: usize,
+    },
+    /// A description promises other planes than there are; all pages are taken as the planes of a volume.
+    PageCount {
+        /// The planes that are promised.
+        promised: usize,
+        /// The pages that there are.
+        found: usize,
+        /// Who promises, as in `the ImageJ description`.
+        source: &'static str,
+    },
+    /// The description of a stack cannot be understood; it does not count.
+    Description {
+        /// Which, as in `the OME-XML`.
+        source: &'static str,
+        /// What is wrong with it.
+        fault: String,
+    },
+    /// The spacing of a radiograph is that at the detector: the body was nearer to the source.
+    AtDetector {
+        /// The spacing along x and y.
+        spacing: [f64; 2],
+    },
+    /// The file says nothing of its spacing, as its format should; it is 1.
+    NoSpacing,
+    /// Slices have no position and were put in order by their numbers.
+    ByNumber {
+        /// Which numbers, as in `instance numbers`.
+        numbers: &'static str,
+    },
 }
 
 /// Where a sample interval stands.
@@ -235,6 +325,19 @@ impl fmt::Display for IntervalSource {
 }
 
 impl ReadNote {
+    /// Whether it is about the spacing of the file, or its unit.
+    pub(super) fn is_about_spacing(&self) -> bool {
+        matches!(
+            self,
+            Self::SampleSize { .. }
+                | Self::NoPlaneSpacing { .. }
+                | Self::UsualResolution { .. }
+                | Self::OblongSamples { .. }
+                | Self::AtDetector { .. }
+                | Self::NoSpacing
+        )
+    }
+
     /// Whether the image may be other than the user thinks: a warning, not a remark.
     pub fn is_warning(&self) -> bool {
         !matches!(
@@ -248,6 +351,15 @@ impl ReadNote {
                 | Self::Axes { .. }
                 | Self::Turned { .. }
                 | Self::Cells
+                | Self::PaletteIndices { is_black_elsewhere: false }
+                | Self::EqualChannels
+                | Self::ColourLabels { .. }
+                | Self::NoColours
+                | Self::WhiteIsZero
+                | Self::SampleSize { .. }
+                | Self::UsualResolution { .. }
+                | Self::Chosen { .. }
+                | Self::AtDetector { .. }
         )
     }
 
@@ -373,6 +485,91 @@ impl fmt::Display for ReadNote {
             Self::Cells => f.write_str(
                 "values are those of cells; samples sit in their middles, half a step on",
             ),
+            Self::PaletteIndices { .. }
+            | Self::EqualChannels
+            | Self::ColourLabels { .. }
+            | Self::NoColours
+            | Self::Lossy
+            | Self::WhiteIsZero => self.write_values(f),
+            Self::AtDetector { spacing: [x, y] } => write!(
+                f,
+                "the spacing {x},{y} is that at the detector (imager pixel spacing); the body was nearer to \
+                 the source, and its parts are smaller by the magnification"
+            ),
+            Self::NoSpacing => f.write_str("the file says no spacing; it is taken to be 1"),
+            Self::ByNumber { numbers } => write!(
+                f,
+                "slices have no position; they are in the order of their {numbers}, evenly spaced"
+            ),
+            _ => self.write_stack(f),
+        }
+    }
+}
+
+impl ReadNote {
+    /// What became of values.
+    fn write_values(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        match self {
+            Self::PaletteIndices { is_black_elsewhere } => {
+                f.write_str("values are the palette's indices; its colours do not count")?;
+                let warning = ": index 0, outside of the mask, is not black, and another index is";
+                if *is_black_elsewhere { f.write_str(warning) } else { Ok(()) }
+            }
+            Self::EqualChannels => {
+                f.write_str("red, green and blue are the same everywhere; they are taken as one value")
+            }
+            Self::ColourLabels { labels, count } => {
+                let text = |(label, colour): &(u32, String)| format!("{label} {colour}");
+                let listed = labels.iter().map(text).collect::<Vec<_>>().join(", ");
+                write!(f, "labels by colour: {listed}")?;
+                match count - labels.len() {
+                    0 => Ok(()),
+                    more => write!(f, " and {more} more"),
+                }
+            }
+            Self::NoColours => f.write_str("there are no colours; values are the labels"),
+            Self::Lossy => f.write_str(
+                "JPEG changes values, most of all where they jump; a PNG or TIFF keeps labels and masks",
+            ),
+            _ => f.write_str("0 is white in the file; values are as they are stored"),
+        }
+    }
+
+    /// What a stack says about its planes.
+    fn write_stack(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        match self {
+            Self::SampleSize { spacing, unit, source } => {
+                let numbers = spacing.iter().map(f64::to_string).collect::<Vec<_>>().join(",");
+                let unit = if unit.is_empty() { "" } else { &format!(" {unit}") };
+                write!(f, "the spacing {numbers}{unit} is that of {source}")
+            }
+            Self::NoPlaneSpacing { spacing, unit } => {
+                let unit = if unit.is_empty() { "" } else { &format!(" {unit}") };
+                write!(
+                    f,
+                    "the file does not say how far apart its planes are; they are taken to be \
+                     {spacing}{unit} apart"
+                )
+            }
+            Self::UsualResolution { per_inch } => write!(
+                f,
+                "the resolution of {per_inch} an inch is one that software writes unasked; the spacing is 1"
+            ),
+            Self::OblongSamples { resolution: [x, y] } => write!(
+                f,
+                "resolutions {x} and {y} without a unit say that samples are not square; the spacing is 1"
+            ),
+            Self::OnePlane { axis, wanted } => {
+                write!(f, "{axis} {wanted} was asked for; there is one {axis}, which is read")
+            }
+            Self::Chosen { axis, number, count } => write!(f, "{axis} {number} of {count}"),
+            Self::PageCount { promised, found, source } => write!(
+                f,
+                "{source} promises {promised} planes, and there are {found}; they are taken as those of a \
+                 volume"
+            ),
+            Self::Description { source, fault } => write!(f, "{source} does not count: {fault}"),
+            _ => Ok(()), // the others are written by their own
         }
     }
 }

@@ -18,6 +18,49 @@ pub struct ReadOptions {
     pub data_root: Option<PathBuf>,
     /// The most bytes that the samples of an image may take. Default: as many as the system gives.
     pub memory_limit: Option<u64>,
+    /// What the values of samples mean. Default: brightness.
+    pub meaning: Meaning,
+    /// Which plane of a TIFF stack with several channels or times.
+    pub stack: StackOptions,
+    /// The parts of the frame that the caller gives, which a file need not state. Default: none.
+    pub given: GivenFrame,
+}
+
+/// What the values of samples mean, which decides what becomes of colours, palettes and grey of few bits.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub enum Meaning {
+    /// Brightness: colour and palettes become luminance, grey of another greatest value than 255 or 65535 is
+    /// stretched to the whole range of 8 or 16 bits.
+    #[default]
+    Brightness,
+    /// Labels: values as they are stored, of palettes the indices. Colour is an error, unless its three channels
+    /// are equal everywhere.
+    Labels,
+    /// Labels, one for each colour: black is 0, the others count from 1, ascending by red, then green, then blue.
+    /// Grey values are labels as they are stored.
+    LabelsByColour,
+    /// A mask, 0 outside: as labels, and of colours the greatest channel.
+    Mask,
+}
+
+/// Which plane of a stack is read, counted from 1, as ImageJ shows them.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub struct StackOptions {
+    /// The channel. Default: the only one.
+    pub channel: Option<usize>,
+    /// The point of time. Default: the only one.
+    pub time: Option<usize>,
+}
+
+/// Which parts of the frame the caller puts in place of the file's.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub struct GivenFrame {
+    /// The spacing. The units that the file names for its own do not count then.
+    pub spacing: bool,
+    /// The place of the first sample.
+    pub origin: bool,
+    /// The directions of the axes.
+    pub direction: bool,
 }
 
 /// What a raw file does not say about itself.

@@ -1,9 +1,9 @@
 //! PNG through the `png` crate: grey and colour of 1 to 16 bits.
 //!
-//! Samples of fewer than 8 bits are stretched to the whole range of 8; palettes are followed. Of an
-//! animation the first picture is read.
+//! Samples of fewer than 8 bits are stretched to the whole range of 8, and palettes are followed; as labels and
+//! masks both stay as they are stored. Of an animation the first picture is read.
 
-use std::io::{BufReader, Read, Seek, SeekFrom};
+use std::io::{BufRead, BufReader, Read, Seek, SeekFrom};
 
 use ::png::{
     BitDepth, ColorType, Compression, DecodingError, EncodingError, Filter, Transformations,
@@ -13,10 +13,12 @@ use atomesh::watch::Watch;
 
 use super::any_image::AnyImage;
 use super::codec::{Begins, Codec, Output, Source};
-use super::colour::grey;
+use super::colour::{Values, palette_note, unpacked};
 use super::error::{ReadReason, WriteReason};
 use super::format::ImageFormat;
+use super::memory::Memory;
 use super::note::LoadedImage;
+use super::options::Meaning;
 use super::shape::plausible_count;
 use super::stream;
 use super::view::ImageView;
@@ -37,9 +39,10 @@ const DENSITY: u64 = 8 * 1032;
 /// Memory that the decoder may take besides 8 bytes for each possible sample.
 const WORKING_MEMORY: u64 = 64 << 20;
 
-/// Decodes a flat image, colour to luminance in place.
+/// Decodes a flat image.
 fn read(source: Source) -> Result<LoadedImage, ReadReason> {
     let (file_bytes, memory) = (source.length, source.memory);
+    let mut values = Values::new(FORMAT, source.options.meaning);
     let mut bytes = BufReader::new(source.bytes);
     refuse_broken_palettes(&mut bytes)?;
     let most = file_bytes.saturating_mul(8 * DENSITY).saturating_add(WORKING_MEMORY);
@@ -49,33 +52,57 @@ fn read(source: Source) -> Result<LoadedImage, ReadReason> {
     // what is not looked at is not unpacked
     decoder.set_ignore_text_chunk(true);
     decoder.set_ignore_iccp_chunk(true);
-    decoder.set_transformations(Transformations::EXPAND);
+    let palette = decoder.read_header_info().map_err(reason)?.color_type == ColorType::Indexed;
+    decoder.set_transformations(match values.meaning {
+        Meaning::Brightness => Transformations::EXPAND,
+        Meaning::LabelsByColour if palette => Transformations::EXPAND,
+        _ => Transformations::IDENTITY,
+    });
     let mut reader = decoder.read_info().map_err(reason)?;
     let shape = [reader.info().width as usize, reader.info().height as usize];
-    let count = plausible_count(&shape, file_bytes, DENSITY)?;
+    plausible_count(&shape, file_bytes, DENSITY)?;
+    let samples = decoded(&mut reader, shape, &mut values, memory)?;
+    if reader.output_color_type().0 == ColorType::Indexed {
+        let palette = reader.info().palette.as_deref().unwrap_or_default();
+        let is_black = |index: usize| palette.get(3 * index..3 * index + 3) == Some(&[0; 3]);
+        values.note(palette_note(&samples, values.meaning, is_black));
+    }
+    let (samples, notes) = values.finish(samples);
+    Ok(LoadedImage { notes, ..AnyImage::frameless(&shape, samples)?.into() })
+}
+
+/// Decodes the samples of a plausible shape: what is stored, one value a sample.
+fn decoded<R: BufRead + Seek>(
+    reader: &mut ::png::Reader<R>,
+    [width, height]: [usize; 2],
+    values: &mut Values,
+    memory: Memory,
+) -> Result<Samples, ReadReason> {
     let (color, depth) = reader.output_color_type();
-    let values = count.saturating_mul(color.samples());
-    let samples = match (color, depth) {
-        (ColorType::Indexed, _) | (_, BitDepth::One | BitDepth::Two | BitDepth::Four) => {
-            return Err(ReadReason::Unsupported {
-                format: FORMAT,
-                found: format!("{color:?} samples of {depth:?} bits"),
-                expected: "grey and colour of 8 and 16 bits",
-            });
+    let count = (width * height).saturating_mul(color.samples());
+    match depth {
+        BitDepth::One | BitDepth::Two | BitDepth::Four => {
+            // grey and palettes alone come in so few bits
+            let bits = depth as usize;
+            let mut packed: Vec<u8> = memory.zeros((width * bits).div_ceil(8) * height)?;
+            reader.next_frame(&mut packed).map_err(reason)?;
+            let mut samples = Vec::new();
+            memory.grow(&mut samples, count, count)?;
+            samples.extend(unpacked(&packed, width, bits));
+            values.of(samples, 1)
         }
-        (_, BitDepth::Eight) => {
-            let mut decoded: Vec<u8> = memory.zeros(values)?;
-            reader.next_frame(&mut decoded).map_err(reason)?;
-            Samples::U8(grey(decoded, color.samples()))
+        BitDepth::Eight => {
+            let mut samples: Vec<u8> = memory.zeros(count)?;
+            reader.next_frame(&mut samples).map_err(reason)?;
+            values.of(samples, color.samples())
         }
-        (_, BitDepth::Sixteen) => {
-            let mut decoded: Vec<u16> = memory.zeros(values)?;
-            reader.next_frame(bytemuck::cast_slice_mut(&mut decoded)).map_err(reason)?;
-            decoded.iter_mut().for_each(|value| *value = u16::from_be(*value));
-            Samples::U16(grey(decoded, color.samples()))
+        BitDepth::Sixteen => {
+            let mut samples: Vec<u16> = memory.zeros(count)?;
+            reader.next_frame(bytemuck::cast_slice_mut(&mut samples)).map_err(reason)?;
+            samples.iter_mut().for_each(|value| *value = u16::from_be(*value));
+            values.of(samples, color.samples())
         }
-    };
-    Ok(AnyImage::frameless(&shape, samples)?.into())
+    }
 }
 
 /// Looks at the chunks before the samples for a palette that is not made of whole colours, three

@@ -26,6 +26,18 @@ pub enum SeriesError {
         /// What is missing.
         entry: &'static str,
     },
+    /// Two slices without a position have the same number.
+    #[error(
+        "{first} and {second} have no position and are both instance {number}; expected one of each number"
+    )]
+    SameNumber {
+        /// The file of one.
+        first: String,
+        /// The file of the other.
+        second: String,
+        /// The number of both.
+        number: f64,
+    },
     /// A slice differs from the others.
     #[error("{file} has {entry} {found}; expected {expected}, as {first} has")]
     Differs {

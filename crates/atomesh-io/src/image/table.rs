@@ -75,9 +75,14 @@ impl ImageFormat {
         found.unwrap_or(&CODECS[0])
     }
 
-    /// Whether files of this format say where their samples are in the world.
+    /// Whether files of this format can say where their samples are in the world, or how far apart.
     pub fn has_frame(self) -> bool {
         self.codec().has_frame
+    }
+
+    /// Whether all files of this format say it.
+    pub fn always_has_frame(self) -> bool {
+        self.has_frame() && !self.codec().frame_is_optional
     }
 
     /// Whether the world's z axis points up, so that pictures show it so. That of seismic data is

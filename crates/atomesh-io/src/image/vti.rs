@@ -61,7 +61,7 @@ fn unsupported(found: String, expected: &'static str) -> ReadReason {
 
 /// Reads a `.vti` file, which is held whole meanwhile.
 fn read(source: Source) -> Result<LoadedImage, ReadReason> {
-    let Source { bytes: mut source, length: file_bytes, memory, .. } = source;
+    let Source { bytes: mut source, length: file_bytes, memory, options, .. } = source;
     let mut bytes = Vec::new();
     memory.reserve(&mut bytes, usize::try_from(file_bytes).unwrap_or(usize::MAX))?;
     source.read_to_end(&mut bytes).map_err(ReadReason::Io)?;
@@ -89,7 +89,7 @@ fn read(source: Source) -> Result<LoadedImage, ReadReason> {
     }
     let axes = if shape[2] == 1 { 2 } else { 3 };
     let read = || samples(array, &shape, file_bytes, memory);
-    let image = affine::image(FORMAT, &shape[..axes], affine, read)?;
+    let image = affine::image(FORMAT, &shape[..axes], affine.with_given(options.given), read)?;
     Ok(LoadedImage::from(image).noting(is_of_cells.then_some(ReadNote::Cells)))
 }
 

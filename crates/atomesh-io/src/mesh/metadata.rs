@@ -48,6 +48,9 @@ fn object<const D: usize>(
         object.insert("version".into(), p.version.clone().into());
         object.insert("seed".into(), p.seed.into());
         object.insert("options".into(), p.options.clone());
+        if !p.units.is_empty() {
+            object.insert("units".into(), json!(p.units));
+        }
     }
     if let Some(f) = frame {
         object.insert(
@@ -87,12 +90,19 @@ impl Metadata {
         }
     }
 
+    /// The units of the world's axes.
+    fn units(&self) -> Vec<String> {
+        let units = self.0.get("units").cloned().unwrap_or_default();
+        serde_json::from_value(units).unwrap_or_default()
+    }
+
     /// The provenance.
     pub fn provenance(&self) -> Option<Provenance> {
         Some(Provenance {
             version: self.0.get("version")?.as_str()?.into(),
             options: self.0.get("options")?.clone(),
             seed: self.0.get("seed")?.as_u64()?,
+            units: self.units(),
         })
     }
 

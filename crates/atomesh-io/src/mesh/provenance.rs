@@ -10,4 +10,14 @@ pub struct Provenance {
     pub options: serde_json::Value,
     /// The seed of the run's random numbers.
     pub seed: u64,
+    /// The units of the world's axes, such as `um`, as the image's file names them; empty if it names none.
+    pub units: Vec<String>,
+}
+
+impl Provenance {
+    /// The same in a world of these units.
+    pub fn in_units(mut self, units: &[String]) -> Self {
+        self.units = units.to_vec();
+        self
+    }
 }

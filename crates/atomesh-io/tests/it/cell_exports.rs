@@ -58,7 +58,7 @@ fn with_data<const D: usize>(
     use_it: impl FnOnce(&CellData<D>),
 ) {
     let options = serde_json::json!({ "lattice": { "units": "physical" } });
-    let provenance = Provenance { version: "0".into(), options, seed: 7 };
+    let provenance = Provenance { version: "0".into(), options, seed: 7, units: Vec::new() };
     let features = features(mesh);
     use_it(&CellData { mesh, features: &features, frame, provenance: &provenance });
 }
@@ -451,7 +451,12 @@ fn two_squares_are_written_as_these_lines() {
 fn written_without_features(frame: &Frame<2>, mesh: &PolyMesh<2>, rock: &Rock) -> [String; 3] {
     let folder = tempfile::tempdir().unwrap();
     let files = ModflowFiles::of(&folder.path().join("two-squares.disv"), true);
-    let provenance = Provenance { version: "0".into(), options: serde_json::json!({}), seed: 7 };
+    let provenance = Provenance {
+        version: "0".into(),
+        options: serde_json::json!({}),
+        seed: 7,
+        units: Vec::new(),
+    };
     let features = FeatureFaces::default();
     let data = CellData { mesh, features: &features, frame, provenance: &provenance };
     write_modflow(&files, &data, rock, &mut Silent).unwrap();

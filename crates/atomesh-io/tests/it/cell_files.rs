@@ -47,7 +47,7 @@ fn unmarked<const D: usize>(mesh: &PolyMesh<D>) -> FeatureFaces {
 fn with_data<const D: usize, T>(mesh: &PolyMesh<D>, use_it: impl FnOnce(&CellData<D>) -> T) -> T {
     let frame = Frame::new([4; D]).unwrap();
     let options = serde_json::json!({});
-    let provenance = Provenance { version: "0".into(), options, seed: 7 };
+    let provenance = Provenance { version: "0".into(), options, seed: 7, units: Vec::new() };
     let features = unmarked(mesh);
     use_it(&CellData { mesh, features: &features, frame: &frame, provenance: &provenance })
 }

@@ -129,7 +129,12 @@ fn heads_of_cells<const D: usize>(
 ) -> [String; 2] {
     let mesh = voronoi(delaunay, sites, bounds, &mut Silent).unwrap();
     let (frame, features) = (Frame::new([4; D]).unwrap(), FeatureFaces::default());
-    let provenance = Provenance { version: "0".into(), options: serde_json::json!({}), seed: 0 };
+    let provenance = Provenance {
+        version: "0".into(),
+        options: serde_json::json!({}),
+        seed: 0,
+        units: Vec::new(),
+    };
     let data =
         CellData { mesh: &mesh, features: &features, frame: &frame, provenance: &provenance };
     let (pressures, velocities) = (vec![1.0; sites.len()], vec![[2.0; D]; sites.len()]);

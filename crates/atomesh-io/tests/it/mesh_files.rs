@@ -69,6 +69,7 @@ fn provenance() -> Provenance {
         version: "0.1.0".into(),
         options: serde_json::json!({ "size": "6..18", "beta": 0.1, "odd": "<&\"$End] é" }),
         seed: u64::MAX,
+        units: vec!["um".into(); 3],
     }
 }
 

@@ -8,8 +8,8 @@ use std::path::Path;
 use atomesh::image::{Frame, Image, Samples, Units};
 use atomesh::watch::Silent;
 use atomesh_io::image::{
-    AnyImage, ImageFormat, ReadError, ReadNote, ReadOptions, ReadReason, SeriesError, decode_image,
-    load_image, read_image, write_image,
+    AnyImage, GivenFrame, ImageFormat, ReadError, ReadNote, ReadOptions, ReadReason, SeriesError,
+    decode_image, load_image, read_image, write_image,
 };
 use proptest::prelude::*;
 
@@ -142,6 +142,20 @@ struct Slice {
     frames: &'static str,
     scale: Option<(&'static str, &'static str)>,
     samples: Vec<u8>,
+    /// Whether it says where it is, which way, and how far apart samples are.
+    has: Said,
+    /// The number in the series.
+    instance: &'static str,
+    /// The spacing at the detector, rows first.
+    imager_spacing: &'static str,
+}
+
+/// What a slice says of its place.
+#[derive(Clone, Copy)]
+struct Said {
+    position: bool,
+    axes: bool,
+    spacing: bool,
 }
 
 impl Slice {
@@ -157,6 +171,9 @@ impl Slice {
             frames: "",
             scale: None,
             samples: bytes()[40 * k..40 * (k + 1)].to_vec(),
+            has: Said { position: true, axes: true, spacing: true },
+            instance: "",
+            imager_spacing: "",
         }
     }
 
@@ -173,9 +190,19 @@ impl Slice {
         // lies that nobody may follow
         file.extend(text(0x0018_0050, b"DS", "99"));
         file.extend(text(0x0018_0088, b"DS", "55"));
+        if !self.imager_spacing.is_empty() {
+            file.extend(text(0x0018_1164, b"DS", self.imager_spacing));
+        }
         file.extend(text(0x0020_000e, b"UI", self.series));
-        file.extend(text(0x0020_0032, b"DS", &list(&self.position)));
-        file.extend(text(0x0020_0037, b"DS", &list(self.axes.as_flattened())));
+        if !self.instance.is_empty() {
+            file.extend(text(0x0020_0013, b"IS", self.instance));
+        }
+        if self.has.position {
+            file.extend(text(0x0020_0032, b"DS", &list(&self.position)));
+        }
+        if self.has.axes {
+            file.extend(text(0x0020_0037, b"DS", &list(self.axes.as_flattened())));
+        }
         file.extend(short(0x0028_0002, 1));
         file.extend(text(0x0028_0004, b"CS", self.photometric));
         if !self.frames.is_empty() {
@@ -183,7 +210,9 @@ impl Slice {
         }
         file.extend(short(0x0028_0010, self.shape[1]));
         file.extend(short(0x0028_0011, self.shape[0]));
-        file.extend(text(0x0028_0030, b"DS", &list(&[SPACING[1], SPACING[0]])));
+        if self.has.spacing {
+            file.extend(text(0x0028_0030, b"DS", &list(&[SPACING[1], SPACING[0]])));
+        }
         for (tag, value) in [(0x0028_0100, 16), (0x0028_0101, 16), (0x0028_0102, 15)] {
             file.extend(short(tag, value));
         }
@@ -668,4 +697,80 @@ proptest! {
         let _ = decode(nrrd.as_bytes(), ImageFormat::NRRD);
         let _ = decode(meta.as_bytes(), ImageFormat::META_IMAGE);
     }
+}
+
+#[test]
+fn what_the_caller_gives_need_not_be_in_the_slices() {
+    let load = |folder: &Path, given: GivenFrame| {
+        load_image(folder, &ReadOptions { given, ..ReadOptions::default() }, &mut Silent)
+    };
+    let nothing = GivenFrame::default();
+    let spacing = GivenFrame { spacing: true, ..nothing };
+    let unspaced = series(|_, slice| slice.has.spacing = false);
+    let text = load(unspaced.path(), nothing).unwrap_err().to_string();
+    assert!(text.contains("no pixel spacing"), "{text}");
+    let loaded = load(unspaced.path(), spacing).unwrap();
+    assert_eq!(*loaded.image.samples(), Samples::I16(values()));
+    assert!(loaded.units.is_empty(), "the caller's unit is not known");
+
+    // files are named against their order, and numbered in it
+    let unplaced = series(|k, slice| {
+        slice.has = Said { position: false, axes: false, spacing: true };
+        slice.instance = ["1", "2", "10"][k];
+    });
+    let text = load(unplaced.path(), nothing).unwrap_err().to_string();
+    assert!(text.contains("no image position"), "{text}");
+    let loaded = load(unplaced.path(), spacing).unwrap();
+    assert_eq!(*loaded.image.samples(), Samples::I16(values()));
+    let note = ReadNote::ByNumber { numbers: "instance numbers" };
+    assert!(loaded.notes.contains(&note) && note.is_warning(), "{:?}", loaded.notes);
+    let twice = series(|k, slice| {
+        slice.has.position = false;
+        slice.instance = ["1", "2", "2"][k];
+    });
+    let text = load(twice.path(), spacing).unwrap_err().to_string();
+    assert!(text.contains("both instance 2"), "{text}");
+
+    let unturned = series(|_, slice| slice.has.axes = false);
+    assert!(load(unturned.path(), spacing).is_err());
+    let both = GivenFrame { direction: true, ..spacing };
+    assert_eq!(*load(unturned.path(), both).unwrap().image.samples(), Samples::I16(values()));
+}
+
+#[test]
+fn the_spacing_of_a_radiograph_is_that_at_the_detector() {
+    let folder = tempfile::tempdir().unwrap();
+    let path = folder.path().join("film.dcm");
+    let load = |change: &dyn Fn(&mut Slice)| {
+        let mut slice = Slice::of(0);
+        slice.has = Said { position: false, axes: false, spacing: false };
+        change(&mut slice);
+        fs::write(&path, slice.bytes()).unwrap();
+        load_image(&path, &ReadOptions::default(), &mut Silent).unwrap()
+    };
+    let film = load(&|slice| slice.imager_spacing = "0.2\\0.1");
+    assert_eq!((film.image.spacing(), film.units[0].as_str()), (vec![0.1, 0.2], "mm"));
+    let note = ReadNote::AtDetector { spacing: [0.1, 0.2] };
+    assert!(film.notes.contains(&note), "{:?}", film.notes);
+    // the patient's goes before the detector's
+    let calibrated = load(&|slice| {
+        slice.imager_spacing = "0.2\\0.1";
+        slice.has.spacing = true;
+    });
+    assert_eq!(calibrated.image.spacing(), [SPACING[0], SPACING[1]]);
+    let unknown = load(&|_| {});
+    assert_eq!((unknown.image.spacing(), unknown.units.len()), (vec![1.0; 2], 0));
+    assert!(unknown.notes.contains(&ReadNote::NoSpacing) && ReadNote::NoSpacing.is_warning());
+}
+
+#[test]
+fn axes_that_are_sheared_are_read_where_the_caller_gives_others() {
+    let header = nrrd_header("RAS", KEPT, "raw").replace("(0,0,-1.25)", "(0.5,0,-1.25)");
+    let bytes = [header.as_bytes(), b"\n", &bytes()].concat();
+    let error = decode(&bytes, ImageFormat::NRRD).unwrap_err();
+    assert!(matches!(error, ReadReason::Sheared { .. }), "{error}");
+    let given = GivenFrame { direction: true, ..GivenFrame::default() };
+    let options = ReadOptions { given, ..ReadOptions::default() };
+    let image = decode_image(&bytes, ImageFormat::NRRD, &options, &mut Silent).unwrap();
+    assert_eq!(*image.samples(), Samples::I16(values()));
 }

@@ -86,8 +86,12 @@ fn check<const D: usize>(
     pick: impl Fn(AnyMesh) -> Option<LoadedMesh<D>>,
 ) {
     let folder = tempfile::tempdir().unwrap();
-    let provenance =
-        Provenance { version: "0.1.0".into(), options: serde_json::json!({}), seed: 7 };
+    let provenance = Provenance {
+        version: "0.1.0".into(),
+        options: serde_json::json!({}),
+        seed: 7,
+        units: Vec::new(),
+    };
     let data = MeshData::new(mesh).with_tags(tags).with_provenance(&provenance);
     for (name, format) in FORMATS {
         let path = folder.path().join(name);

@@ -244,7 +244,8 @@ fn run<const D: usize>(
 ) -> Result<FeaturesSummary, JobError> {
     files.check_dimension(D)?;
     let (frame, options) = (loaded.frame.as_ref(), &request.frame);
-    let beside = Beside { frame, options, role: ImageRole::Followed };
+    let provenance = loaded.provenance.as_ref();
+    let beside = Beside { frame, provenance, options, role: ImageRole::Followed };
     let image = match request.source() {
         Some(path) => Some(beside.read(path, dimension, session)?),
         None => None,

@@ -20,17 +20,15 @@ pub use options::{FlowOptions, FlowOutputOptions};
 
 use std::path::PathBuf;
 
-use atomesh::image::Image;
 use atomesh_flow::dg::{self, Form};
 use atomesh_flow::{Balance, Setting, Solution, WellFlow};
-use atomesh_io::image::{AnyImage, ImageFormat};
+use atomesh_io::image::{AnyImage, ImageFormat, LoadedImage};
 use atomesh_io::mesh::MeshFormat;
 
 use crate::dimension::Dimension;
 use crate::error::JobError;
-use crate::images;
 use crate::memory;
-use crate::mesh::{MeshImages, prepare, shown};
+use crate::mesh::{MeshImages, ShownImage, prepare, read_shown, shown};
 use crate::mesh_file;
 use crate::options::{
     FrameOptions, ImprovementOptions, InputOptions, LatticeOptions, OptimizerOptions,
@@ -237,9 +235,14 @@ pub fn flow_file(request: FlowRequest, session: &mut Session<'_>) -> Result<Flow
     let run = with_wells(run, &options);
     run.check()?;
     let work = FileRun { run: &run, options: &options, files: &files };
-    match images::read(&path, &run.frame.read_options()?, session)? {
-        AnyImage::Flat(image) => work.mesh(image, &Dimension::plane(), session),
-        AnyImage::Volume(image) => work.mesh(image, &Dimension::space(), session),
+    let LoadedImage { image, units, .. } = read_shown(&run, session)?;
+    match image {
+        AnyImage::Flat(image) => {
+            work.mesh(ShownImage { image, units }, &Dimension::plane(), session)
+        }
+        AnyImage::Volume(image) => {
+            work.mesh(ShownImage { image, units }, &Dimension::space(), session)
+        }
     }
 }
 
@@ -271,15 +274,17 @@ impl FileRun<'_> {
     /// Meshes the image, solves and writes.
     fn mesh<const D: usize>(
         &self,
-        image: Image<D>,
+        image: ShownImage<D>,
         dimension: &Dimension<D>,
         session: &mut Session<'_>,
     ) -> Result<FlowSummary, JobError> {
         let images = MeshImages::read_fields(self.run, image, dimension, session)?;
+        let units = images.units.clone();
         let (prepared, image) = prepare(self.run, images, dimension, session)?;
         let image = self.files.picture.is_some().then_some(image);
         let mut mesh = FlowMesh::of_prepared(self.run, self.options, prepared, session)?;
         mesh.image = image;
+        mesh.provenance = mesh.provenance.map(|provenance| provenance.in_units(&units));
         self.solve(mesh, dimension, session)
     }
 

@@ -26,7 +26,8 @@ pub(super) fn permeability<const D: usize>(
     let Some(path) = &options.permeability_image else {
         return given(&options.permeability, &mesh.cell_fields);
     };
-    let beside = Beside { frame: mesh.frame.as_ref(), options: frame, role: ImageRole::Property };
+    let (own, provenance) = (mesh.frame.as_ref(), mesh.provenance.as_ref());
+    let beside = Beside { frame: own, provenance, options: frame, role: ImageRole::Property };
     let image = beside.read(path, dimension, session)?;
     let statistic = options.permeability_mean.parse().map_err(JobError::misuse)?;
     let statistics = [statistic];

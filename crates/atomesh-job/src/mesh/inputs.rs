@@ -4,14 +4,46 @@ use std::path::{Path, PathBuf};
 
 use atomesh::image::{Between, Frame, Image};
 use atomesh::run::Inputs;
-use atomesh_io::image::{AnyImage, ImageFormat, ReadOptions};
+use atomesh_io::image::{LoadedImage, Meaning, ReadOptions};
 
 use crate::dimension::Dimension;
 use crate::error::JobError;
-use crate::images;
+use crate::images::{self, is_placed, scaled, unit_ratio};
 use crate::memory;
 use crate::options::RunConfig;
 use crate::session::{Note, NoteKind, Session};
+
+/// The image that gives the frame, as read.
+#[derive(Clone, Debug)]
+pub struct ShownImage<const D: usize> {
+    /// The image.
+    pub image: Image<D>,
+    /// The units of its world's axes, as [`LoadedImage::units`].
+    pub units: Vec<String>,
+}
+
+impl<const D: usize> From<Image<D>> for ShownImage<D> {
+    fn from(image: Image<D>) -> Self {
+        Self { image, units: Vec::new() }
+    }
+}
+
+/// What a field is: how it is read, and what lies between its samples.
+#[derive(Clone, Copy, Debug)]
+struct FieldKind {
+    meaning: Meaning,
+    between: Between,
+}
+
+impl FieldKind {
+    fn values(outside: Option<f64>) -> Self {
+        Self { meaning: Meaning::Brightness, between: Between::Linear { outside } }
+    }
+
+    fn whole(meaning: Meaning) -> Self {
+        Self { meaning, between: Between::Nearest }
+    }
+}
 
 /// The images that a mesh is made from, in place: in their frame, cropped, without NaN.
 #[derive(Clone, Debug)]
@@ -30,6 +62,8 @@ pub struct MeshImages<const D: usize> {
     pub mask: Option<Image<D>>,
     /// A label for each sample.
     pub labels: Option<Image<D>>,
+    /// The units of the world's axes, as [`LoadedImage::units`].
+    pub units: Vec<String>,
 }
 
 impl<const D: usize> MeshImages<D> {
@@ -43,6 +77,7 @@ impl<const D: usize> MeshImages<D> {
             weight_field: None,
             mask: None,
             labels: None,
+            units: Vec::new(),
         }
     }
 
@@ -52,30 +87,32 @@ impl<const D: usize> MeshImages<D> {
     /// [`JobError`] if a file cannot be used, or options make no sense.
     pub fn read_fields(
         run: &RunConfig,
-        image: Image<D>,
+        image: impl Into<ShownImage<D>>,
         dimension: &Dimension<D>,
         session: &mut Session<'_>,
     ) -> Result<Self, JobError> {
+        let ShownImage { image, units } = image.into();
         let input = &run.input;
         let shown = input.shown();
-        let of = Samples::of(&image, run).map_err(|e| e.about_any(shown))?;
+        let of = Samples::of(&image, units, run).map_err(|e| e.about_any(shown))?;
         let image = run.frame.place(image).map_err(|e| e.about_any(shown))?;
         run.mesh_options::<D>()?;
         memory::check_potential(image.samples().len(), "mesh").map_err(|e| e.about_any(shown))?;
-        let mut field = |path: &Option<PathBuf>, between: Between| {
-            let read = |path| read_field(run, path, &of, between, dimension, session);
+        let mut field = |path: &Option<PathBuf>, kind: FieldKind| {
+            let read = |path| read_field(run, path, &of, kind, dimension, session);
             path.as_deref().map(read).transpose()
         };
-        let size_field = field(&input.size_field, Between::Linear { outside: None })?;
-        let weight_field = field(&input.beta_field, Between::Linear { outside: None })?;
-        let mask = field(&input.mask, Between::Nearest)?;
-        let labels = field(&input.labels, Between::Nearest)?;
+        let size_field = field(&input.size_field, FieldKind::values(None))?;
+        let weight_field = field(&input.beta_field, FieldKind::values(None))?;
+        let mask = field(&input.mask, FieldKind::whole(Meaning::Mask))?;
+        let labels = field(&input.labels, FieldKind::whole(Meaning::Labels))?;
         // without IMAGE, the potential is the image; outside of its file there are no features
-        let no_feature = Between::Linear { outside: Some(0.0) };
+        let no_feature = FieldKind::values(Some(0.0));
         let potential =
             if input.image.is_some() { field(&input.potential, no_feature)? } else { None };
         let is_potential = input.potential.is_some() && potential.is_none();
-        Ok(Self { image, is_potential, potential, size_field, weight_field, mask, labels })
+        let Samples { units, .. } = of;
+        Ok(Self { image, is_potential, potential, size_field, weight_field, mask, labels, units })
     }
 
     /// b(x) in the image's frame, if it is given beside the image.
@@ -115,8 +152,20 @@ fn name(run: &RunConfig) -> String {
 ///
 /// # Errors
 /// [`JobError`] if options name none, or the file cannot be used.
-pub fn read_shown(run: &RunConfig, session: &mut Session<'_>) -> Result<AnyImage, JobError> {
-    images::read(shown(run)?, &run.frame.read_options()?, session)
+pub fn read_shown(run: &RunConfig, session: &mut Session<'_>) -> Result<LoadedImage, JobError> {
+    images::read(shown(run)?, &run.frame.read_options_for(meaning(run))?, session)
+}
+
+/// What the values of the image that gives the frame mean: labels, where it is that of the labels, or the boundaries
+/// between its values are the features.
+fn meaning(run: &RunConfig) -> Meaning {
+    let input = &run.input;
+    let is_labels = match (&input.image, &input.potential, &input.labels) {
+        (None, None, Some(_)) => true,
+        (Some(_), None, None) => run.features.are_labels(),
+        _ => false,
+    };
+    if is_labels { Meaning::Labels } else { Meaning::Brightness }
 }
 
 /// The file of the image that gives the frame.
@@ -133,22 +182,18 @@ struct Samples<const D: usize> {
     placed: Frame<D>,
     /// Whether the file or an option says so at all.
     is_placed: bool,
+    /// The units of the world's axes.
+    units: Vec<String>,
 }
 
 impl<const D: usize> Samples<D> {
-    fn of(image: &Image<D>, run: &RunConfig) -> Result<Self, JobError> {
+    fn of(image: &Image<D>, units: Vec<String>, run: &RunConfig) -> Result<Self, JobError> {
         let own = *image.frame();
         let placed = run.frame.apply(own)?;
         let is_placed =
             placed != own || run.input.shown().is_some_and(|path| is_placed(path, &own));
-        Ok(Self { own, placed, is_placed })
+        Ok(Self { own, placed, is_placed, units })
     }
-}
-
-/// Whether a file says where its samples are: a frame of unit steps at 0 is that of headers that say nothing.
-fn is_placed<const D: usize>(path: &Path, frame: &Frame<D>) -> bool {
-    let unit = Frame::new(frame.shape());
-    ImageFormat::of(path).is_some_and(ImageFormat::has_frame) && unit.as_ref() != Ok(frame)
 }
 
 /// Reads an image that belongs to the samples of the first: it is placed by its own frame where there is one, else by its
@@ -157,14 +202,14 @@ fn read_field<const D: usize>(
     run: &RunConfig,
     path: &Path,
     of: &Samples<D>,
-    between: Between,
+    FieldKind { meaning, between }: FieldKind,
     dimension: &Dimension<D>,
     session: &mut Session<'_>,
 ) -> Result<Image<D>, JobError> {
-    let options = ReadOptions { raw: None, ..run.frame.read_options()? };
-    let any = images::read(path, &options, session)?;
+    let options = ReadOptions { raw: None, ..run.frame.read_options_for(meaning)? };
+    let LoadedImage { image: any, units, .. } = images::read(path, &options, session)?;
     let found = any.dimension();
-    let Some(field) = (dimension.image)(any) else {
+    let Some(mut field) = (dimension.image)(any) else {
         let message = format!("has {found} axes; expected {D}, as {}", name(run));
         return Err(JobError::content(message).about(path));
     };
@@ -172,6 +217,11 @@ fn read_field<const D: usize>(
         let kind = if is_warning { NoteKind::Warning } else { NoteKind::Change };
         session.note(Note { kind, file: Some(path.into()), text });
     };
+    let own = *field.frame();
+    if let Some((ratio, text)) = unit_ratio(&units, &of.units).filter(|_| is_placed(path, &own)) {
+        field = field.with_frame(scaled(&own, ratio)?).map_err(JobError::content)?;
+        say(false, text);
+    }
     let field = onto(field, run, path, of, between, &mut say).map_err(|e| e.about(path))?;
     run.frame.place(field).map_err(|e| e.about(path))
 }

@@ -13,7 +13,7 @@ mod write;
 
 pub use figures::{Figures, Measured};
 pub(crate) use inputs::shown;
-pub use inputs::{MeshImages, read_shown};
+pub use inputs::{MeshImages, ShownImage, read_shown};
 pub(crate) use outputs::staged_list;
 pub(crate) use refusal::refusal;
 pub use write::Tagged;
@@ -23,7 +23,7 @@ use std::path::{Path, PathBuf};
 use atomesh::image::Image;
 use atomesh::improve::ImproveReport;
 use atomesh::run::{Estimate, Outcome, Prepared};
-use atomesh_io::image::AnyImage;
+use atomesh_io::image::{AnyImage, LoadedImage};
 
 use crate::dimension::Dimension;
 use crate::error::JobError;
@@ -139,9 +139,14 @@ pub fn mesh_file(
     let outputs = Outputs::new(&run, options.write_config)?;
     outputs.check(&run, session)?;
     let work = FileRun { run: &run, outputs: &outputs, options };
-    match read_shown(&run, session)? {
-        AnyImage::Flat(image) => work.run(image, &Dimension::plane(), session),
-        AnyImage::Volume(image) => work.run(image, &Dimension::space(), session),
+    let LoadedImage { image, units, .. } = read_shown(&run, session)?;
+    match image {
+        AnyImage::Flat(image) => {
+            work.run(ShownImage { image, units }, &Dimension::plane(), session)
+        }
+        AnyImage::Volume(image) => {
+            work.run(ShownImage { image, units }, &Dimension::space(), session)
+        }
     }
 }
 
@@ -152,9 +157,14 @@ pub fn mesh_file(
 pub fn expect(mut run: RunConfig, session: &mut Session<'_>) -> Result<Expectation, JobError> {
     run.take_labels_alone();
     run.check()?;
-    match read_shown(&run, session)? {
-        AnyImage::Flat(image) => expect_image(&run, image, &Dimension::plane(), session),
-        AnyImage::Volume(image) => expect_image(&run, image, &Dimension::space(), session),
+    let LoadedImage { image, units, .. } = read_shown(&run, session)?;
+    match image {
+        AnyImage::Flat(image) => {
+            expect_image(&run, ShownImage { image, units }, &Dimension::plane(), session)
+        }
+        AnyImage::Volume(image) => {
+            expect_image(&run, ShownImage { image, units }, &Dimension::space(), session)
+        }
     }
 }
 
@@ -163,7 +173,7 @@ const SECONDS_PER_ATOM: [f64; 2] = [5e-5, 1.2e-5];
 
 fn expect_image<const D: usize>(
     run: &RunConfig,
-    image: Image<D>,
+    image: ShownImage<D>,
     dimension: &Dimension<D>,
     session: &mut Session<'_>,
 ) -> Result<Expectation, JobError> {
@@ -188,12 +198,13 @@ struct FileRun<'a> {
 impl FileRun<'_> {
     fn run<const D: usize>(
         &self,
-        image: Image<D>,
+        image: ShownImage<D>,
         dimension: &Dimension<D>,
         session: &mut Session<'_>,
     ) -> Result<MeshSummary, JobError> {
         let (run, outputs) = (self.run, self.outputs);
         let images = MeshImages::read_fields(run, image, dimension, session)?;
+        let units = images.units.clone();
         let (prepared, image) = prepare(run, images, dimension, session)?;
         let image = outputs.needs_image().then_some(image);
         let outcome = meshed(run, prepared, session)?;
@@ -205,7 +216,7 @@ impl FileRun<'_> {
         let figures = Figures::new(run, &outcome, measured, dimension.tools, session)?;
         let tagged = session.write_together(|group, session| {
             let outputs = &outputs.staged(group)?;
-            let writing = Writing { run, outputs, outcome: &outcome, dimension };
+            let writing = Writing { run, outputs, outcome: &outcome, units: &units, dimension };
             let tagged = writing.write(image.as_ref(), session)?;
             self.write_about(&writing, image.as_ref(), &figures, session)?;
             Ok(tagged)
@@ -223,7 +234,7 @@ impl FileRun<'_> {
         figures: &Figures,
         session: &mut Session<'_>,
     ) -> Result<(), JobError> {
-        let Writing { run, outputs, outcome, dimension } = *writing;
+        let Writing { run, outputs, outcome, dimension, .. } = *writing;
         if let Some(path) = &outputs.config {
             write_bytes(path, run.clone().with_defaults::<D>().to_toml()?.as_bytes())?;
         }

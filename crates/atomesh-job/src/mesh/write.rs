@@ -34,6 +34,8 @@ pub(super) struct Writing<'a, const D: usize> {
     pub run: &'a RunConfig,
     pub outputs: &'a Outputs,
     pub outcome: &'a Outcome<D>,
+    /// The units of the world's axes, if they are known.
+    pub units: &'a [String],
     pub dimension: &'a Dimension<D>,
 }
 
@@ -62,7 +64,7 @@ impl<const D: usize> Writing<'_, D> {
         if let Some(path) = &self.outputs.potential {
             self.write_potential(path, session)?;
         }
-        let provenance = self.run.provenance::<D>();
+        let provenance = self.run.provenance::<D>().in_units(self.units);
         match self.outputs.format {
             OutputFormat::Simplices(format) => self.write_simplices(format, &provenance, session),
             _ => self.write_voronoi(&provenance, session).map(|()| None),

@@ -1,7 +1,8 @@
 //! How the image becomes a potential.
 
 use atomesh::enhance::{
-    CrestOptions, EdgeOperator, FaultOptions, FeatureOptions, HorizonOptions, Mixture, Polarity,
+    CrestOptions, EdgeOperator, FaultOptions, FeatureOptions, Features, HorizonOptions, Mixture,
+    Polarity,
 };
 
 use super::section::section;
@@ -128,6 +129,12 @@ impl PotentialOptions {
             high: self.high,
             least_length: self.least_length,
         }
+    }
+
+    /// Whether the boundaries between labels are the only features.
+    pub fn are_labels(&self) -> bool {
+        let single = self.features.as_ref().and_then(|mixture| mixture.0.single());
+        single == Some(Features::Labels)
     }
 
     /// The kinds of features, if they are more than one of weight 1.

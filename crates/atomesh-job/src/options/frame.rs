@@ -4,7 +4,8 @@ use std::path::PathBuf;
 
 use atomesh::image::{Frame, FrameError, Image};
 use atomesh_io::image::{
-    ByteOrder, RawLayout, ReadOptions, SampleFormat, SampleType, SegyOptions, Vertical,
+    ByteOrder, GivenFrame, Meaning, RawLayout, ReadOptions, SampleFormat, SampleType, SegyOptions,
+    StackOptions, Vertical,
 };
 use serde::{Deserialize, Serialize};
 
@@ -13,7 +14,7 @@ use crate::error::JobError;
 use crate::memory;
 use crate::values::{Counts, Numbers, Text, WorldBox};
 #[cfg(feature = "clap")]
-use crate::values::{named, number_in};
+use crate::values::{count_in, named, number_in};
 
 /// Which byte of a number comes first.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
@@ -47,6 +48,17 @@ section! {
         #[arg(long, value_name = "VALUE", allow_hyphen_values = true,
             value_parser = number_in(f64::MIN, f64::MAX, "a finite number"))]
         pub fill: f64,
+        /// TIFF stacks of several channels: which one, from 1, as ImageJ counts. Default: several are an error
+        #[arg(long, value_name = "N", value_parser = count_in(1, "a number from 1"))]
+        pub channel: usize,
+        /// TIFF stacks of several points of time: which one, from 1. Default: several are an error
+        #[arg(long, value_name = "N", value_parser = count_in(1, "a number from 1"))]
+        pub time: usize,
+        /// Colour images as labels: one for each colour, black 0, the others from 1 by ascending red, green, blue.
+        /// Default: false, colours are an error; grey values and indices of palettes are labels as they are
+        #[arg(long, value_name = "BOOL", num_args = 0..=1, require_equals = true,
+            default_missing_value = "true")]
+        pub labels_by_color: bool,
         /// Raw samples: how many along x, y (and z), x fastest in the file. A NumPy array of
         /// shape (nz, ny, nx) is NX,NY,NZ here
         #[arg(long, value_name = "NX,NY[,NZ]")]
@@ -124,7 +136,27 @@ impl FrameOptions {
             return Err(JobError::misuse(format!("--data-root {} is no folder", root.display())));
         }
         let data_root = self.data_root.clone();
-        Ok(ReadOptions { raw: self.raw_layout()?, segy, data_root, memory_limit: memory::room() })
+        let stack = StackOptions { channel: self.channel, time: self.time };
+        if [stack.channel, stack.time].contains(&Some(0)) {
+            return Err(JobError::misuse("--channel and --time count from 1"));
+        }
+        let given = GivenFrame {
+            spacing: self.spacing.is_some(),
+            origin: self.origin.is_some(),
+            direction: self.direction.is_some(),
+        };
+        let (raw, memory_limit) = (self.raw_layout()?, memory::room());
+        let meaning = Meaning::default();
+        Ok(ReadOptions { raw, segy, data_root, memory_limit, stack, given, meaning })
+    }
+
+    /// How images are read whose values mean that; labels go by colour if that is asked for.
+    pub fn read_options_for(&self, meaning: Meaning) -> Result<ReadOptions, JobError> {
+        let meaning = match meaning {
+            Meaning::Labels if self.labels_by_color == Some(true) => Meaning::LabelsByColour,
+            other => other,
+        };
+        Ok(ReadOptions { meaning, ..self.read_options()? })
     }
 
     /// The frame with what the options override.

@@ -7,7 +7,7 @@ use atomesh::run::Tools;
 use atomesh::sample::{CellProperties, SampleError, SampleOptions};
 use atomesh::watch::Watch;
 use atomesh_io::mesh::cells::{CellData, LoadedCells};
-use atomesh_io::mesh::{CellFields, LoadedMesh, MeshData, MeshFormat, OwnedField};
+use atomesh_io::mesh::{CellFields, LoadedMesh, MeshData, MeshFormat, OwnedField, Provenance};
 
 use super::Property;
 use crate::dimension::Dimension;
@@ -22,6 +22,9 @@ pub trait SampledMesh<const D: usize> {
 
     /// The frame of the image that the mesh follows, if it is known.
     fn frame(&self) -> Option<&Frame<D>>;
+
+    /// What the file says of its making, if it does.
+    fn provenance(&self) -> Option<&Provenance>;
 
     /// The fields that the cells have; they have none then.
     fn take_fields(&mut self) -> Vec<OwnedField<f64>>;
@@ -64,6 +67,10 @@ impl<const D: usize> SampledMesh<D> for LoadedMesh<D> {
 
     fn frame(&self) -> Option<&Frame<D>> {
         self.frame.as_ref()
+    }
+
+    fn provenance(&self) -> Option<&Provenance> {
+        self.provenance.as_ref()
     }
 
     fn take_fields(&mut self) -> Vec<OwnedField<f64>> {
@@ -117,6 +124,10 @@ impl<const D: usize> SampledMesh<D> for LoadedCells<D> {
 
     fn frame(&self) -> Option<&Frame<D>> {
         Some(&self.frame)
+    }
+
+    fn provenance(&self) -> Option<&Provenance> {
+        self.provenance.as_ref()
     }
 
     fn take_fields(&mut self) -> Vec<OwnedField<f64>> {

@@ -30,3 +30,14 @@ pub fn number_in(
             .ok_or_else(|| ValueError { found: text.into(), expected })
     }
 }
+
+/// A count that is not too low, for clap.
+pub fn count_in(
+    least: usize,
+    expected: &'static str,
+) -> impl Fn(&str) -> Result<usize, ValueError> + Clone + Send + Sync + 'static {
+    move |text| {
+        let count = text.trim().parse().ok().filter(|&n| n >= least);
+        count.ok_or_else(|| ValueError { found: text.into(), expected })
+    }
+}

@@ -7,7 +7,7 @@ mod wells;
 mod world_box;
 
 #[cfg(feature = "clap")]
-pub use arguments::{named, number_in};
+pub use arguments::{count_in, named, number_in};
 pub use size::SizeValue;
 pub use wells::{BarrierSpec, SideSpec, WellSpec};
 pub use world_box::WorldBox;

@@ -24,6 +24,8 @@ const UNDEFINED: u32 = u32::MAX;
 pub(super) mod tag {
     pub const TRANSFER_SYNTAX: u32 = 0x0002_0010;
     pub const SERIES: u32 = 0x0020_000e;
+    pub const IMAGER_SPACING: u32 = 0x0018_1164;
+    pub const INSTANCE: u32 = 0x0020_0013;
     pub const POSITION: u32 = 0x0020_0032;
     pub const ORIENTATION: u32 = 0x0020_0037;
     pub const SAMPLES_PER_PIXEL: u32 = 0x0028_0002;
@@ -45,9 +47,11 @@ pub(super) mod tag {
     pub const SEQUENCE_END: u32 = 0xfffe_e0dd;
 
     /// The elements that are kept.
-    pub const WANTED: [u32; 17] = [
+    pub const WANTED: [u32; 19] = [
         TRANSFER_SYNTAX,
+        IMAGER_SPACING,
         SERIES,
+        INSTANCE,
         POSITION,
         ORIENTATION,
         SAMPLES_PER_PIXEL,

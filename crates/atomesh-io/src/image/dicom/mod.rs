@@ -6,7 +6,11 @@
 //! in the files and are turned to RAS, as NIfTI's are. Samples are those that are stored, or, with a
 //! rescale slope and intercept (Hounsfield units), single precision; where the least value is white
 //! (MONOCHROME1) they are turned round first. A single slice is a flat image; its frame is kept if the
-//! slice lies across z, and is its spacing alone if not, since a plane has no other place for it.
+//! slice lies across z, and is its spacing alone if not, since a plane has no other place for it. The spacing of a
+//! radiograph may be known at the detector alone (imager pixel spacing); it is taken, with a note.
+//!
+//! What the caller gives of the frame need not be in the files: slices without a position are put in the order of their
+//! instance numbers where the spacing is given.
 //!
 //! Plain samples are read, and those packed by run lengths. JPEG and its kin, frames in one file, and
 //! colours are refused by name. The grammar of a data set is short and written here by hand: the crate that
@@ -19,12 +23,13 @@ use atomesh::image::Samples;
 use atomesh::watch::{Phase, Watch, check};
 
 use super::affine::{self, Affine, World};
+use super::any_image::AnyImage;
 use super::codec::{Codec, Folder, Source};
 use super::error::ReadReason;
 use super::format::ImageFormat;
 use super::memory::Memory;
-use super::note::LoadedImage;
-use super::options::ReadOptions;
+use super::note::{LoadedImage, ReadNote};
+use super::options::{GivenFrame, ReadOptions};
 
 mod data_set;
 mod series;
@@ -35,6 +40,9 @@ use series::Series;
 use slice::{Pixels, Scale, Slice};
 
 const FORMAT: ImageFormat = ImageFormat::named("DICOM");
+
+/// The unit of all lengths.
+const MILLIMETRE: &str = "mm";
 
 /// The magic word comes after 128 bytes of anything; the reader looks for it.
 pub(super) const CODEC: Codec = Codec {
@@ -52,7 +60,7 @@ fn is_dicom(path: &Path) -> bool {
 
 /// Reads a file with a single slice.
 fn read(source: Source) -> Result<LoadedImage, ReadReason> {
-    let memory = source.memory;
+    let (given, memory) = (source.options.given, source.memory);
     let mut reader = Reader::new(source.bytes, source.length);
     let slice = Slice::read(&mut reader)?.ok_or_else(|| ReadReason::Unsupported {
         format: FORMAT,
@@ -60,13 +68,13 @@ fn read(source: Source) -> Result<LoadedImage, ReadReason> {
         expected: "a slice",
     })?;
     let shape = slice.pixels.shape;
-    let (affine, world) = flat_affine(&slice);
-    let image = affine::image(FORMAT, &shape, affine, || {
+    let flat = Flat::of(&slice, given);
+    let image = affine::image(FORMAT, &shape, flat.affine, || {
         let mut volume = Volume::new(&slice.pixels, slice.is_plain(), shape[0] * shape[1], memory)?;
         volume.append(&slice.samples(&mut reader, memory)?, slice.scale);
         Ok(volume.samples)
     })?;
-    Ok(LoadedImage::from(image).noting(world.note()))
+    Ok(flat.loaded(image))
 }
 
 /// Reads the slices in a folder.
@@ -76,6 +84,38 @@ fn read_folder(
     watch: &mut dyn Watch,
 ) -> Result<LoadedImage, ReadReason> {
     let memory = Memory::up_to(options.memory_limit);
+    let (slices, others) = headers(folder, watch)?;
+    let series = Series::new(slices, others, options.given)?;
+    let slices = &series.slices;
+    let (_, head) = &slices[0];
+    let [nx, ny] = head.pixels.shape;
+    let samples = || {
+        let is_plain = slices.iter().all(|(_, slice)| slice.is_plain());
+        let mut volume = Volume::new(&head.pixels, is_plain, nx * ny * slices.len(), memory)?;
+        for (k, (file, slice)) in slices.iter().enumerate() {
+            check(watch, Phase::Read, 0.1 + 0.9 * k as f64 / slices.len() as f64, None)?;
+            let values =
+                open(&folder.join(file)).and_then(|mut reader| slice.samples(&mut reader, memory));
+            volume.append(&values.map_err(|reason| in_file(file, reason))?, slice.scale);
+        }
+        Ok(volume.samples)
+    };
+    if slices.len() == 1 {
+        let flat = Flat::of(head, options.given);
+        return Ok(flat.loaded(affine::image(FORMAT, &[nx, ny], flat.affine, samples)?));
+    }
+    let affine = head.affine(series.step).with_given(options.given);
+    let image = affine::image(FORMAT, &[nx, ny, slices.len()], affine, samples)?;
+    let loaded = LoadedImage { units: vec![MILLIMETRE.into(); 3], ..image.into() };
+    let by_number = ReadNote::ByNumber { numbers: "instance numbers" };
+    Ok(loaded.noting(World::LeftPosterior.note()).noting(series.is_by_number.then_some(by_number)))
+}
+
+/// The slices in a folder, each with the name of its file, and how many other files there are.
+fn headers(
+    folder: &Path,
+    watch: &mut dyn Watch,
+) -> Result<(Vec<(String, Slice)>, usize), ReadReason> {
     let mut names = Vec::new();
     for entry in fs::read_dir(folder).map_err(ReadReason::Io)? {
         let entry = entry.map_err(ReadReason::Io)?;
@@ -96,32 +136,7 @@ fn read_folder(
             None => others += 1,
         }
     }
-    let series = Series::new(slices, others)?;
-    let slices = &series.slices;
-    let (_, head) = &slices[0];
-    let [nx, ny] = head.pixels.shape;
-    let samples = || {
-        let is_plain = slices.iter().all(|(_, slice)| slice.is_plain());
-        let mut volume = Volume::new(&head.pixels, is_plain, nx * ny * slices.len(), memory)?;
-        for (k, (file, slice)) in slices.iter().enumerate() {
-            check(watch, Phase::Read, 0.1 + 0.9 * k as f64 / slices.len() as f64, None)?;
-            let values =
-                open(&folder.join(file)).and_then(|mut reader| slice.samples(&mut reader, memory));
-            volume.append(&values.map_err(|reason| in_file(file, reason))?, slice.scale);
-        }
-        Ok(volume.samples)
-    };
-    let (image, world) = match slices.len() {
-        1 => {
-            let (affine, world) = flat_affine(head);
-            (affine::image(FORMAT, &[nx, ny], affine, samples)?, world)
-        }
-        nz => {
-            let affine = head.affine(series.step);
-            (affine::image(FORMAT, &[nx, ny, nz], affine, samples)?, World::LeftPosterior)
-        }
-    };
-    Ok(LoadedImage::from(image).noting(world.note()))
+    Ok((slices, others))
 }
 
 /// The error of a file in the folder.
@@ -143,15 +158,40 @@ fn header(path: &Path) -> Result<Option<Slice>, ReadReason> {
     if is_dicom(path) { Slice::read(&mut open(path)?) } else { Ok(None) }
 }
 
-/// The affine of a single slice, and the world it was stated in: where it is if it lies across z, else
-/// its spacing.
-fn flat_affine(slice: &Slice) -> (Affine, World) {
-    let affine = slice.affine([0.0, 0.0, 1.0]);
-    if affine::flat_frame(FORMAT, slice.pixels.shape, affine).is_ok() {
-        return (affine, World::LeftPosterior);
+/// A single slice without its samples: where it is if it lies across z, else its spacing alone.
+struct Flat {
+    affine: Affine,
+    world: World,
+    /// What is said of the spacing.
+    note: Option<ReadNote>,
+}
+
+impl Flat {
+    fn of(slice: &Slice, given: GivenFrame) -> Self {
+        let spacing = slice.spacing.or(slice.imager_spacing);
+        let note = match (slice.spacing, slice.imager_spacing) {
+            (Some(_), _) => None,
+            (None, Some(spacing)) => Some(ReadNote::AtDetector { spacing }),
+            (None, None) => Some(ReadNote::NoSpacing),
+        };
+        let mut slice = slice.clone();
+        slice.spacing = spacing;
+        let affine = slice.affine([0.0, 0.0, 1.0]).with_given(given);
+        if affine::flat_frame(FORMAT, slice.pixels.shape, affine).is_ok() {
+            return Self { affine, world: World::LeftPosterior, note };
+        }
+        let [x, y] = spacing.unwrap_or([1.0; 2]);
+        Self { affine: Affine::scaling([x, y, 1.0]), world: World::Ours, note }
     }
-    let [x, y] = slice.spacing.unwrap_or([1.0; 2]);
-    (Affine::scaling([x, y, 1.0]), World::Ours)
+
+    /// The image with what is known of it.
+    fn loaded(&self, image: AnyImage) -> LoadedImage {
+        let units = match self.note {
+            Some(ReadNote::NoSpacing) => Vec::new(),
+            _ => vec![MILLIMETRE.into(); 2],
+        };
+        LoadedImage { units, ..image.into() }.noting(self.world.note()).noting(self.note.clone())
+    }
 }
 
 /// The samples of all slices.

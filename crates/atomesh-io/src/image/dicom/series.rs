@@ -7,6 +7,7 @@ use std::collections::BTreeMap;
 
 use atomesh::geometry::dot;
 
+use super::super::options::GivenFrame;
 use super::super::series_error::SeriesError;
 use super::slice::Slice;
 
@@ -31,11 +32,17 @@ pub(super) struct Series {
     /// Each with the name of its file.
     pub slices: Vec<(String, Slice)>,
     pub step: [f64; 3],
+    /// Whether they have no places, and are in the order of their numbers.
+    pub is_by_number: bool,
 }
 
 impl Series {
-    /// Puts slices in order. A single one needs no place.
-    pub fn new(mut slices: Vec<(String, Slice)>, others: usize) -> Result<Self, SeriesError> {
+    /// Puts slices in order. A single one needs no place, and none needs what the caller gives.
+    pub fn new(
+        mut slices: Vec<(String, Slice)>,
+        others: usize,
+        given: GivenFrame,
+    ) -> Result<Self, SeriesError> {
         slices.sort_by(|a, b| a.0.cmp(&b.0));
         let Some((first, head)) = slices.first().cloned() else {
             return Err(SeriesError::NoImages { others });
@@ -45,29 +52,83 @@ impl Series {
             same(&first, &head, file, slice)?;
         }
         if slices.len() == 1 {
-            return Ok(Self { slices, step: [0.0; 3] });
+            return Ok(Self { slices, step: [0.0; 3], is_by_number: false });
         }
-        let missing = |file: &str, entry| SeriesError::Missing { file: file.into(), entry };
-        let axes = head.axes.ok_or_else(|| missing(&first, "image orientation"))?;
-        let normal = normal(axes).ok_or(SeriesError::Axes { file: first, axes })?;
-        let mut placed = Vec::new();
-        for (file, slice) in slices {
-            let position = slice.position.ok_or_else(|| missing(&file, "image position"))?;
-            slice.spacing.ok_or_else(|| missing(&file, "pixel spacing"))?;
-            placed.push((dot(&position, &normal), position, file, slice));
+        let lacks = |lacks: fn(&Slice) -> bool| slices.iter().find(|(_, slice)| lacks(slice));
+        let missing = |(file, _): &(String, Slice), entry| {
+            Err(SeriesError::Missing { file: file.clone(), entry })
+        };
+        if let Some(odd) = lacks(|s| s.spacing.is_none()).filter(|_| !given.spacing) {
+            return missing(odd, "pixel spacing");
         }
-        placed.sort_by(|a, b| a.0.total_cmp(&b.0).then_with(|| a.2.cmp(&b.2)));
-        let places: Vec<_> =
-            placed.iter().map(|(place, _, file, _)| (*place, file.as_str())).collect();
-        even(&places)?;
-        let (from, to) = (placed[0].1, placed[placed.len() - 1].1);
-        let gaps = (placed.len() - 1) as f64;
-        let step = std::array::from_fn(|r| (to[r] - from[r]) / gaps);
-        Ok(Self {
-            slices: placed.into_iter().map(|(_, _, file, slice)| (file, slice)).collect(),
-            step,
-        })
+        let has_axes = head.axes.is_some();
+        match lacks(|s| s.position.is_none()) {
+            Some(_) if given.spacing && lacks(|s| s.instance.is_none()).is_none() => {
+                return Self::by_number(slices);
+            }
+            Some(odd) => return missing(odd, "image position"),
+            None if !(has_axes || given.spacing && given.direction) => {
+                return missing(&slices[0], "image orientation");
+            }
+            None => {}
+        }
+        let normal = match head.axes {
+            Some(axes) => normal(axes).ok_or(SeriesError::Axes { file: first, axes })?,
+            None => widest(&slices),
+        };
+        Self::by_place(slices, normal, has_axes)
     }
+
+    /// Slices in the order of their places along a normal; a step along z if their axes are not known.
+    fn by_place(
+        slices: Vec<(String, Slice)>,
+        normal: [f64; 3],
+        has_axes: bool,
+    ) -> Result<Self, SeriesError> {
+        let place = |slice: &Slice| slice.position.map_or(0.0, |p| dot(&p, &normal));
+        let mut placed: Vec<_> = slices.into_iter().map(|(f, s)| (place(&s), f, s)).collect();
+        placed.sort_by(|a, b| a.0.total_cmp(&b.0).then_with(|| a.1.cmp(&b.1)));
+        let places: Vec<_> =
+            placed.iter().map(|(place, file, _)| (*place, file.as_str())).collect();
+        even(&places)?;
+        let at = |k: usize| placed[k].2.position.unwrap_or_default();
+        let (from, to) = (at(0), at(placed.len() - 1));
+        let gaps = (placed.len() - 1) as f64;
+        let mut step = std::array::from_fn(|r| (to[r] - from[r]) / gaps);
+        if !has_axes {
+            step = [0.0, 0.0, dot(&step, &step).sqrt()];
+        }
+        let slices = placed.into_iter().map(|(_, file, slice)| (file, slice)).collect();
+        Ok(Self { slices, step, is_by_number: false })
+    }
+
+    /// Slices in the order of their numbers, 1 apart.
+    fn by_number(mut slices: Vec<(String, Slice)>) -> Result<Self, SeriesError> {
+        let number = |slice: &Slice| slice.instance.unwrap_or_default();
+        slices.sort_by(|a, b| number(&a.1).total_cmp(&number(&b.1)));
+        let twice = slices.windows(2).find(|pair| number(&pair[0].1) == number(&pair[1].1));
+        if let Some([first, second]) = twice {
+            let number = number(&first.1);
+            let (first, second) = (first.0.clone(), second.0.clone());
+            return Err(SeriesError::SameNumber { first, second, number });
+        }
+        let normal = slices[0].1.axes.and_then(normal);
+        // the first may be placed without the others
+        slices.iter_mut().for_each(|(_, slice)| slice.position = None);
+        Ok(Self { slices, step: normal.unwrap_or([0.0, 0.0, 1.0]), is_by_number: true })
+    }
+}
+
+/// The world's axis along which slices are farthest apart.
+fn widest(slices: &[(String, Slice)]) -> [f64; 3] {
+    let spread = |k: usize| {
+        let places = || slices.iter().filter_map(|(_, slice)| Some(slice.position?[k]));
+        places().fold(f64::MIN, f64::max) - places().fold(f64::MAX, f64::min)
+    };
+    let mut normal = [0.0; 3];
+    let widest = (1..3).fold(0, |best, k| if spread(k) > spread(best) { k } else { best });
+    normal[widest] = 1.0;
+    normal
 }
 
 /// The unit normal of two unit vectors at right angles.

@@ -33,6 +33,10 @@ pub(super) struct Slice {
     pub pixels: Pixels,
     /// World units from sample to sample along x and y, if the file says it.
     pub spacing: Option<[f64; 2]>,
+    /// The same at the detector of a radiograph.
+    pub imager_spacing: Option<[f64; 2]>,
+    /// The number in the series, if the file says it.
+    pub instance: Option<f64>,
     /// Sample 0 in the world of the file, LPS.
     pub position: Option<[f64; 3]>,
     /// The directions of x and y there.
@@ -76,7 +80,7 @@ impl Slice {
         if set.get(tag::MODALITY_TABLE).is_some() {
             return Err(unsupported("a modality look-up table", "a rescale slope and intercept"));
         }
-        let (pixels, spacing) = (pixels(&set, [columns, rows])?, spacing(&set)?);
+        let pixels = pixels(&set, [columns, rows])?;
         let place = set.pixels.ok_or_else(|| wrong(FORMAT, "pixel data", "missing", "samples"))?;
         let axes = set.decimals::<6>(tag::ORIENTATION, "image orientation (patient)")?;
         let slope = set.decimals(tag::SLOPE, "rescale slope")?.unwrap_or([1.0])[0];
@@ -84,7 +88,9 @@ impl Slice {
         let slice = Self {
             series: set.text(tag::SERIES).unwrap_or_default(),
             pixels,
-            spacing,
+            spacing: spacing(&set, tag::PIXEL_SPACING, "pixel spacing")?,
+            imager_spacing: spacing(&set, tag::IMAGER_SPACING, "imager pixel spacing")?,
+            instance: set.decimals(tag::INSTANCE, "instance number")?.map(|[number]| number),
             position: set.decimals(tag::POSITION, "image position (patient)")?,
             axes: axes.map(|[a, b, c, d, e, f]| [[a, b, c], [d, e, f]]),
             scale: Scale { slope, intercept },
@@ -217,11 +223,11 @@ fn pixels(set: &DataSet, shape: [u16; 2]) -> Result<Pixels, ReadReason> {
     })
 }
 
-/// The spacing along x and y; the file has that between rows, along y, first.
-fn spacing(set: &DataSet) -> Result<Option<[f64; 2]>, ReadReason> {
-    let spacing = set.decimals::<2>(tag::PIXEL_SPACING, "pixel spacing")?;
+/// A spacing along x and y; the file has that between rows, along y, first.
+fn spacing(set: &DataSet, tag: u32, name: &'static str) -> Result<Option<[f64; 2]>, ReadReason> {
+    let spacing = set.decimals::<2>(tag, name)?;
     if let Some(spacing) = spacing.filter(|s| s.iter().any(|&s| s <= 0.0)) {
-        return Err(wrong(FORMAT, "pixel spacing", format!("{spacing:?}"), "numbers above 0"));
+        return Err(wrong(FORMAT, name, format!("{spacing:?}"), "numbers above 0"));
     }
     Ok(spacing.map(|[y, x]| [x, y]))
 }

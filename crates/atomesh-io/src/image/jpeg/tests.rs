@@ -1,7 +1,8 @@
 //! Files of another program: see tests/data.
 
-use super::super::{ReadOptions, decode_image};
+use super::super::{ReadOptions, decode_image, load_bytes};
 use super::*;
+use atomesh::image::Samples;
 use atomesh::watch::Silent;
 
 fn decode(bytes: &[u8]) -> Result<AnyImage, ReadReason> {
@@ -60,4 +61,18 @@ fn broken_files_are_refused() {
     huge[frame + 5..frame + 9].fill(0xff);
     let error = decode(&huge).unwrap_err();
     assert!(matches!(error, ReadReason::TooLarge { .. }), "{error}");
+}
+
+#[test]
+fn labels_and_masks_are_warned_of_and_colours_are_no_labels() {
+    let load = |bytes: &[u8], meaning| {
+        let options = ReadOptions { meaning, ..ReadOptions::default() };
+        load_bytes(bytes, FORMAT, &options, &mut Silent)
+    };
+    for meaning in [Meaning::Labels, Meaning::Mask] {
+        let notes = load(data!("pillow-grey-ramp.jpg"), meaning).unwrap().notes;
+        assert!(notes == [ReadNote::Lossy] && notes[0].is_warning(), "{notes:?}");
+    }
+    let error = load(data!("pillow-halves-420.jpg"), Meaning::Labels).unwrap_err();
+    assert!(matches!(error, ReadReason::ColourLabels { .. }), "{error}");
 }

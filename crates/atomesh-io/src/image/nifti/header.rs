@@ -4,6 +4,7 @@ use std::io::Read;
 
 use super::super::affine::Affine;
 use super::super::error::ReadReason;
+use super::super::options::GivenFrame;
 use super::super::sample_type::{ByteOrder, SampleType};
 use super::super::{spelling, stream};
 use super::FORMAT;
@@ -25,6 +26,7 @@ pub(super) mod at {
     pub const VOX_OFFSET: usize = 108;
     pub const SCL_SLOPE: usize = 112;
     pub const SCL_INTER: usize = 116;
+    pub const XYZT_UNITS: usize = 123;
     pub const QFORM_CODE: usize = 252;
     pub const SFORM_CODE: usize = 254;
     pub const QUATERN_B: usize = 256;
@@ -45,6 +47,8 @@ pub(super) struct Header {
     pub scale: Option<(f64, f64)>,
     /// Sample indices to world coordinates.
     pub affine: Affine,
+    /// The unit of these, if it is named.
+    pub unit: Option<&'static str>,
 }
 
 /// The error for an entry of the header.
@@ -65,6 +69,11 @@ impl Header {
             return Err(wrong("length", format!("{filled} bytes"), "348 bytes"));
         }
         Self::parse(&bytes)
+    }
+
+    /// The same, with an affine that is sound where the caller puts something else in its place.
+    pub fn with_given(self, given: GivenFrame) -> Self {
+        Self { affine: self.affine.with_given(given), ..self }
     }
 
     /// Reads a header from its bytes.
@@ -100,6 +109,13 @@ impl Header {
             offset: entries.offset()?,
             scale: entries.scale()?,
             affine: entries.affine(shape.len())?,
+            // the upper bits are of time
+            unit: match bytes[at::XYZT_UNITS] & 7 {
+                1 => Some("m"),
+                2 => Some("mm"),
+                3 => Some("um"),
+                _ => None,
+            },
             shape,
         })
     }
@@ -316,6 +332,15 @@ mod tests {
         assert_eq!(parse(axes(5, 1, 1)).unwrap().shape, [4, 3, 2]);
         assert!(matches!(parse(axes(5, 4, 3)), Err(ReadReason::Volumes { count: 12 })));
         assert_eq!(parse(axes(2, 1, 1)).unwrap().shape, [4, 3]);
+    }
+
+    #[test]
+    fn the_unit_is_that_of_space_alone() {
+        for (code, unit) in
+            [(0, None), (1, Some("m")), (2, Some("mm")), (3 | 8, Some("um")), (8, None)]
+        {
+            assert_eq!(parse(put(at::XYZT_UNITS, [code])).unwrap().unit, unit, "{code}");
+        }
     }
 
     #[test]

@@ -2,7 +2,7 @@
 //!
 //! Definition: <https://nifti.nimh.nih.gov/pub/dist/src/niftilib/nifti1.h>. World coordinates are
 //! the file's own: x to the right, y to the front, z to the top of the head (RAS+), nearly always
-//! in millimetres. Two-file NIfTI (`.hdr` and `.img`), NIfTI-2 and ANALYZE are refused by name.
+//! in millimetres; the unit that the header names (`xyzt_units`) is stated, and none is changed. Two-file NIfTI (`.hdr` and `.img`), NIfTI-2 and ANALYZE are refused by name.
 
 use std::io::{Read, Write};
 
@@ -62,8 +62,8 @@ pub(super) const GZIPPED: Codec = Codec {
 
 /// Reads a `.nii` file.
 fn read(source: Source) -> Result<LoadedImage, ReadReason> {
-    let Source { bytes: mut source, length: file_bytes, memory, .. } = source;
-    let header = Header::read(&mut source)?;
+    let Source { bytes: mut source, length: file_bytes, memory, options, .. } = source;
+    let header = Header::read(&mut source)?.with_given(options.given);
     let size = header.sample_type.size() as u64;
     let found = file_bytes.saturating_sub(header.offset) / size;
     // the header's axes are 16 bits wide, so that their product cannot overflow
@@ -71,15 +71,16 @@ fn read(source: Source) -> Result<LoadedImage, ReadReason> {
     if expected > found {
         return Err(ReadReason::Truncated { expected, found });
     }
-    Ok(samples_after(&mut source, &header, [expected as usize; 2], memory)?.into())
+    let image = samples_after(&mut source, &header, [expected as usize; 2], memory)?;
+    Ok(in_units(image, &header))
 }
 
 /// Reads a `.nii.gz` file. Memory is allocated as samples come, since the unpacked size is not known.
 /// The stream is unpacked up to its end, so that its check sum is checked, unless that is far behind the samples.
 fn read_gzipped(source: Source) -> Result<LoadedImage, ReadReason> {
-    let (file_bytes, memory) = (source.length, source.memory);
+    let (file_bytes, memory, given) = (source.length, source.memory, source.options.given);
     let mut source = MultiGzDecoder::new(std::io::BufReader::with_capacity(1 << 16, source.bytes));
-    let header = Header::read(&mut source)?;
+    let header = Header::read(&mut source)?.with_given(given);
     let density = GZIP_RATIO / header.sample_type.size() as u64;
     let count = plausible_count(&header.shape, file_bytes, density)?;
     let packed_samples = file_bytes as usize / header.sample_type.size();
@@ -87,7 +88,13 @@ fn read_gzipped(source: Source) -> Result<LoadedImage, ReadReason> {
         samples_after(&mut source, &header, [count, packed_samples.saturating_mul(4)], memory)?;
     std::io::copy(&mut source.take(MOST_BEHIND), &mut std::io::sink())
         .map_err(|e| ReadReason::decoder(FORMAT_GZIPPED, e))?;
-    Ok(image.into())
+    Ok(in_units(image, &header))
+}
+
+/// The image with the unit that its header names for all axes.
+fn in_units(image: AnyImage, header: &Header) -> LoadedImage {
+    let units = header.unit.map_or(Vec::new(), |unit| vec![unit.into(); header.shape.len()]);
+    LoadedImage { units, ..image.into() }
 }
 
 /// Skips what is between header and samples, and reads `count` of those, `reserve` of which memory is allocated for

@@ -43,14 +43,15 @@ pub(super) const CODEC: Codec = Codec {
 
 /// Reads a `.nrrd` or `.nhdr` file.
 fn read(source: Source) -> Result<LoadedImage, ReadReason> {
-    let Source { bytes: source, length: file_bytes, folders, memory, .. } = source;
+    let Source { bytes: source, length: file_bytes, folders, memory, options } = source;
     let mut source = BufReader::with_capacity(1 << 16, source);
     let mut lines = Lines::new(&mut source);
     let header = Header::read(&mut lines)?;
     let rest = file_bytes.saturating_sub(lines.bytes);
     let payload = header.payload;
     let read = || payload.read(source, rest, folders, memory);
-    let image = affine::image(FORMAT, &payload.shape, header.affine, read)?;
+    let affine = header.affine.with_given(options.given);
+    let image = affine::image(FORMAT, &payload.shape, affine, read)?;
     Ok(LoadedImage::from(image).noting(header.world.note()))
 }
 

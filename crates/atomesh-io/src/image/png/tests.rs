@@ -1,6 +1,7 @@
 //! Files of every kind of sample, chunk by chunk.
 
-use super::super::{ReadOptions, decode_image};
+use super::super::note::ReadNote;
+use super::super::{ReadOptions, decode_image, load_bytes};
 use super::*;
 use atomesh::watch::Silent;
 use std::io::Write;
@@ -152,4 +153,78 @@ fn what_is_written_is_read_again() {
         let back = decode(&file.into_inner()).unwrap();
         assert_eq!((back.shape(), back.samples()), (vec![3, 2], &samples));
     }
+}
+
+/// The samples by what they mean, and the notes.
+fn meant(meaning: Meaning, png: &[u8]) -> (Samples, Vec<ReadNote>) {
+    let options = ReadOptions { meaning, ..ReadOptions::default() };
+    let loaded = load_bytes(png, FORMAT, &options, &mut Silent).unwrap();
+    (loaded.image.samples().clone(), loaded.notes)
+}
+
+#[test]
+fn labels_of_few_bits_stay_as_they_are_stored() {
+    for is_interlaced in [false, true] {
+        let kind = |depth| Kind { shape: [3, 1], depth, is_interlaced, ..Kind::default() };
+        // of one row of three, interlacing stores sample 0 first, then 2, then 1
+        let rows = |whole: &[u8], passes: [&[u8]; 3]| -> Vec<u8> {
+            if is_interlaced { passes.concat() } else { whole.to_vec() }
+        };
+        let two = rows(&[0, 0b0001_1100], [&[0, 0], &[0, 0b1100_0000], &[0, 0b0100_0000]]);
+        for meaning in [Meaning::Labels, Meaning::Mask] {
+            let (samples, notes) = meant(meaning, &file(kind(2), &[], &two));
+            assert_eq!((samples, notes), (Samples::U8(vec![0, 1, 3]), vec![]));
+        }
+        let one = rows(&[0, 0b1010_0000], [&[0, 0x80], &[0, 0x80], &[0, 0]]);
+        let (samples, _) = meant(Meaning::Labels, &file(kind(1), &[], &one));
+        assert_eq!(samples, Samples::U8(vec![1, 0, 1]));
+    }
+    let wide = Kind { shape: [2, 1], depth: 16, ..Kind::default() };
+    let (samples, _) = meant(Meaning::Labels, &file(wide, &[], &[0, 0, 1, 0x12, 0x34]));
+    assert_eq!(samples, Samples::U16(vec![1, 0x1234]));
+}
+
+#[test]
+fn labels_of_a_palette_are_its_indices_or_its_colours() {
+    let kind = Kind { shape: [3, 1], depth: 8, color: 3, ..Kind::default() };
+    // red and green of one luminance
+    let palette: (&[u8; 4], &[u8]) = (b"PLTE", &[255, 0, 0, 0, 130, 0, 0, 0, 255]);
+    let png = file(kind, &[palette], &[0, 0, 1, 2]);
+    let indices = ReadNote::PaletteIndices { is_black_elsewhere: false };
+    for meaning in [Meaning::Labels, Meaning::Mask] {
+        let (samples, notes) = meant(meaning, &png);
+        assert_eq!((samples, notes), (Samples::U8(vec![0, 1, 2]), vec![indices.clone()]));
+    }
+    let (samples, notes) = meant(Meaning::LabelsByColour, &png);
+    assert_eq!(samples, Samples::U32(vec![3, 2, 1]));
+    assert!(notes[0].to_string().contains("3 #ff0000"), "{notes:?}");
+    assert_eq!(meant(Meaning::Brightness, &png).0, Samples::U8(vec![76, 76, 29]));
+    let narrow = Kind { depth: 4, ..kind };
+    let (samples, _) = meant(Meaning::Labels, &file(narrow, &[palette], &[0, 0x01, 0x20]));
+    assert_eq!(samples, Samples::U8(vec![0, 1, 2]));
+}
+
+#[test]
+fn a_mask_whose_palette_begins_with_white_is_warned_of() {
+    let kind = Kind { shape: [2, 1], depth: 8, color: 3, ..Kind::default() };
+    let palette: (&[u8; 4], &[u8]) = (b"PLTE", &[255, 255, 255, 0, 0, 0]);
+    let mask = |rows: &[u8]| meant(Meaning::Mask, &file(kind, &[palette], rows)).1;
+    let warning = [ReadNote::PaletteIndices { is_black_elsewhere: true }];
+    assert!(mask(&[0, 0, 1]) == warning && warning[0].is_warning());
+    // black that is nowhere is no reason to warn
+    assert_eq!(mask(&[0, 0, 0]), [ReadNote::PaletteIndices { is_black_elsewhere: false }]);
+}
+
+#[test]
+fn colours_are_labels_where_they_are_asked_to_be() {
+    let kind = Kind { shape: [2, 1], depth: 8, color: 2, ..Kind::default() };
+    let png = file(kind, &[], &[0, 255, 0, 0, 0, 130, 0]);
+    let options = ReadOptions { meaning: Meaning::Labels, ..ReadOptions::default() };
+    let error = decode_image(&png, FORMAT, &options, &mut Silent).unwrap_err();
+    assert!(matches!(error, ReadReason::ColourLabels { .. }), "{error}");
+    assert_eq!(meant(Meaning::LabelsByColour, &png).0, Samples::U32(vec![2, 1]));
+    assert_eq!(meant(Meaning::Mask, &png).0, Samples::U8(vec![255, 130]));
+    let grey = Kind { color: 0, ..kind };
+    let (samples, notes) = meant(Meaning::LabelsByColour, &file(grey, &[], &[0, 7, 8]));
+    assert_eq!((samples, notes), (Samples::U8(vec![7, 8]), vec![ReadNote::NoColours]));
 }

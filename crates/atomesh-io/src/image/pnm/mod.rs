@@ -1,7 +1,8 @@
 //! PNM, the Netpbm family: PBM, PGM and PPM as text and as bytes, and PAM.
 //!
 //! Definition: <https://netpbm.sourceforge.net/doc/pnm.html>, <https://netpbm.sourceforge.net/doc/pam.html>.
-//! Samples with another greatest value than 255 or 65535 are stretched to the whole range of 8 or 16 bits.
+//! Samples with another greatest value than 255 or 65535 are stretched to the whole range of 8 or 16 bits; labels
+//! and masks stay as they are stored, black and white ones 0 where black and 1 where white.
 //! Of a file with several images the first is read.
 
 use std::io::{BufRead, BufReader};
@@ -10,11 +11,12 @@ use atomesh::image::Samples;
 
 use super::any_image::AnyImage;
 use super::codec::{Begins, Codec, Source};
-use super::colour::{Channel, grey};
+use super::colour::{Channel, Values, unpacked};
 use super::error::ReadReason;
 use super::format::ImageFormat;
 use super::memory::Memory;
 use super::note::LoadedImage;
+use super::options::Meaning;
 use super::sample_type::ByteOrder;
 use super::shape::plausible_count;
 use super::stream::{self, Layout};
@@ -46,15 +48,19 @@ fn read(source: Source) -> Result<LoadedImage, ReadReason> {
     let mut bytes = BufReader::with_capacity(1 << 16, source.bytes);
     let header = Header::read(&mut bytes)?;
     let count = plausible_count(&header.shape, file_bytes, DENSITY)?;
+    let mut values = Values::new(FORMAT, source.options.meaning);
+    let white = if values.meaning == Meaning::Brightness { 255 } else { 1 };
     let samples = match header.raster {
-        Raster::TextBits => Samples::U8(text_bits(&mut bytes, count, memory)?),
-        Raster::Bits => Samples::U8(bits(&mut bytes, header.shape, memory)?),
+        Raster::TextBits => values.of(text_bits(&mut bytes, count, white, memory)?, 1)?,
+        Raster::Bits => values.of(bits(&mut bytes, header.shape, white, memory)?, 1)?,
         Raster::Text => {
-            numbers(&mut TextSamples::new(bytes, header.sample_type()), &header, count, memory)?
+            let mut text = TextSamples::new(bytes, header.sample_type());
+            numbers(&mut text, &header, count, (&mut values, memory))?
         }
-        Raster::Bytes => numbers(&mut bytes, &header, count, memory)?,
+        Raster::Bytes => numbers(&mut bytes, &header, count, (&mut values, memory))?,
     };
-    Ok(AnyImage::frameless(&header.shape, samples)?.into())
+    let (samples, notes) = values.finish(samples);
+    Ok(LoadedImage { notes, ..AnyImage::frameless(&header.shape, samples)?.into() })
 }
 
 /// Numbers of one or two bytes, the most significant first, or as text with the least first.
@@ -62,14 +68,13 @@ fn numbers(
     source: &mut dyn std::io::Read,
     header: &Header,
     count: usize,
-    memory: Memory,
+    (values, memory): (&mut Values, Memory),
 ) -> Result<Samples, ReadReason> {
     let is_text = header.raster == Raster::Text;
-    let values = count.saturating_mul(header.channels);
     let layout = Layout {
         sample_type: header.sample_type(),
         byte_order: if is_text { ByteOrder::Little } else { ByteOrder::Big },
-        count: values,
+        count: count.saturating_mul(header.channels),
         reserve: count,
         scale: None,
         turned: None,
@@ -82,9 +87,10 @@ fn numbers(
         }
         other => other,
     })?;
+    let stretches = values.meaning == Meaning::Brightness;
     match read {
-        Samples::U8(values) => Ok(Samples::U8(stretched(values, header)?)),
-        Samples::U16(values) => Ok(Samples::U16(stretched(values, header)?)),
+        Samples::U8(v) => values.of(checked(v, header, stretches)?, header.channels),
+        Samples::U16(v) => values.of(checked(v, header, stretches)?, header.channels),
         other => Ok(other), // no other type is asked for
     }
 }
@@ -109,33 +115,38 @@ macro_rules! values {
 
 values!(u8, u16);
 
-/// Values stretched to the whole range of their type, and colour to luminance.
-fn stretched<T: Value>(mut values: Vec<T>, header: &Header) -> Result<Vec<T>, ReadReason> {
+/// Values that are in their range, stretched to the whole range of their type if that is wanted.
+fn checked<T: Value>(
+    mut values: Vec<T>,
+    header: &Header,
+    stretches: bool,
+) -> Result<Vec<T>, ReadReason> {
     if header.is_strict
         && let Some(value) =
             values.iter().map(|&value| value.into()).find(|&v: &u32| v > header.greatest)
     {
         return Err(wrong("sample", value, "0 or 1 in a black and white image"));
     }
-    if header.greatest != T::GREATEST {
+    if stretches && header.greatest != T::GREATEST {
         let factor = T::GREATEST as f32 / header.greatest as f32;
         for value in &mut values {
             let real: f32 = (*value).into();
             *value = T::rounded(real * factor);
         }
     }
-    Ok(grey(values, header.channels))
+    Ok(values)
 }
 
-/// The grey of a bit: 1 is black.
-fn grey_of(bit: u8) -> u8 {
-    if bit == 0 { 255 } else { 0 }
+/// The grey of a bit, given white's: 1 is black.
+fn grey_of(bit: u8, white: u8) -> u8 {
+    if bit == 0 { white } else { 0 }
 }
 
 /// Bits in rows of whole bytes, the first the most significant.
 fn bits(
     source: &mut dyn BufRead,
     [width, height]: [usize; 2],
+    white: u8,
     memory: Memory,
 ) -> Result<Vec<u8>, ReadReason> {
     memory.check(width as u128 * height as u128)?;
@@ -147,7 +158,7 @@ fn bits(
             return Err(ReadReason::Truncated { expected, found });
         }
         memory.grow(&mut samples, width, width * height)?;
-        samples.extend((0..width).map(|x| grey_of(row[x / 8] >> (7 - x % 8) & 1)));
+        samples.extend(unpacked(&row, width, 1).map(|bit| grey_of(bit, white)));
     }
     Ok(samples)
 }
@@ -156,6 +167,7 @@ fn bits(
 fn text_bits(
     source: &mut dyn BufRead,
     count: usize,
+    white: u8,
     memory: Memory,
 ) -> Result<Vec<u8>, ReadReason> {
     let mut samples = Vec::new();
@@ -168,7 +180,7 @@ fn text_bits(
         match byte[0] {
             digit @ (b'0' | b'1') => {
                 memory.grow(&mut samples, 1, count)?;
-                samples.push(grey_of(digit - b'0'));
+                samples.push(grey_of(digit - b'0', white));
             }
             blank if header::is_blank(blank) => {}
             other => return Err(wrong("sample", other.escape_ascii(), "0 or 1")),

@@ -105,3 +105,18 @@ fn broken_files_are_refused() {
         assert!(decode(whole).is_ok());
     }
 }
+
+#[test]
+fn labels_stay_as_they_are_stored() {
+    let labels = |bytes: &[u8]| {
+        let options = ReadOptions { meaning: Meaning::Labels, ..ReadOptions::default() };
+        decode_image(bytes, FORMAT, &options, &mut Silent).map(|image| image.samples().clone())
+    };
+    assert_eq!(labels(b"P5 4 1 3\n\x00\x01\x02\x03").unwrap(), Samples::U8(vec![0, 1, 2, 3]));
+    assert_eq!(labels(b"P2 2 1 1000 0 999").unwrap(), Samples::U16(vec![0, 999]));
+    // 1 is black
+    assert_eq!(labels(b"P1 2 1 1 0").unwrap(), Samples::U8(vec![0, 1]));
+    assert_eq!(labels(b"P4 2 1\n\x80").unwrap(), Samples::U8(vec![0, 1]));
+    let error = labels(b"P6 1 1 255\n\xff\x00\x00").unwrap_err();
+    assert!(matches!(error, ReadReason::ColourLabels { .. }), "{error}");
+}

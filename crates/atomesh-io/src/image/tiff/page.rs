@@ -1,0 +1,145 @@
+//! What the pages of a file must have in common, and the tags that say it.
+
+use std::io::{Read, Seek};
+
+use ::tiff::ColorType;
+use ::tiff::decoder::Decoder;
+use ::tiff::decoder::ifd::Value;
+use ::tiff::tags::{PhotometricInterpretation, SampleFormat, Tag, Type, ValueBuffer};
+
+use super::super::error::ReadReason;
+use super::super::sample_type::SampleType;
+use super::super::shape::shape_text;
+use super::{FORMAT, reason};
+
+/// What all pages must have in common.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub(super) struct Page {
+    pub width: usize,
+    pub height: usize,
+    pub color: ColorType,
+    pub sample_format: SampleFormat,
+    /// Whether 0 stands for white.
+    pub is_white_zero: bool,
+}
+
+fn unsupported(found: String) -> ReadReason {
+    ReadReason::Unsupported {
+        format: FORMAT,
+        found,
+        expected: "grey of 1 to 64 bits and colour of 8, 16, 32 or 64, channels interleaved",
+    }
+}
+
+impl Page {
+    /// Shape and type of the page at which the decoder is, if they are supported; of palettes, where indices are
+    /// wanted.
+    pub fn of<R: Read + Seek>(
+        decoder: &mut Decoder<R>,
+        wants_indices: bool,
+    ) -> Result<Self, ReadReason> {
+        let (width, height) = decoder.dimensions().map_err(reason)?;
+        let shade = shade(decoder);
+        let (color, sample_format) = match shade {
+            Some(PhotometricInterpretation::RGBPalette) if wants_indices => {
+                let bits = decoder.find_tag_unsigned(Tag::BitsPerSample).map_err(reason)?;
+                (ColorType::Palette(bits.unwrap_or(1)), SampleFormat::Uint)
+            }
+            _ => {
+                let color = decoder.colortype().map_err(reason)?;
+                let layout = decoder.image_buffer_layout().map_err(reason)?;
+                if layout.planes > 1 {
+                    return Err(unsupported(format!("{} separate channel planes", layout.planes)));
+                }
+                (color, layout.sample_format)
+            }
+        };
+        let is_read = match color {
+            ColorType::Gray(bits) | ColorType::Palette(bits) => {
+                [1, 2, 4, 8, 16, 32, 64].contains(&bits)
+            }
+            ColorType::GrayA(bits) | ColorType::RGB(bits) | ColorType::RGBA(bits) => {
+                [8, 16, 32, 64].contains(&bits)
+            }
+            other => return Err(unsupported(format!("{other:?} samples"))),
+        };
+        if !is_read {
+            return Err(unsupported(format!("samples of {} bits", color.bit_depth())));
+        }
+        let is_white_zero = shade == Some(PhotometricInterpretation::WhiteIsZero);
+        let (width, height) = (width as usize, height as usize);
+        Ok(Self { width, height, color, sample_format, is_white_zero })
+    }
+
+    /// The bytes of a sample with all its channels.
+    pub fn sample_bytes(&self) -> u128 {
+        (u128::from(self.color.bit_depth()) * u128::from(self.color.num_samples())).div_ceil(8)
+    }
+
+    /// Shape and type for a message.
+    pub fn text(&self) -> String {
+        let Self { color, sample_format, .. } = self;
+        format!("{} {color:?} {sample_format:?}", shape_text(&[self.width, self.height]))
+    }
+
+    /// The interleaved values of a sample.
+    pub fn channels(&self) -> usize {
+        match self.color {
+            ColorType::GrayA(_) => 2,
+            ColorType::RGB(_) => 3,
+            ColorType::RGBA(_) => 4,
+            _ => 1,
+        }
+    }
+
+    /// The type of its values, where they take whole bytes.
+    pub fn sample_type(&self) -> Option<SampleType> {
+        Some(match (self.sample_format, self.color.bit_depth()) {
+            (SampleFormat::Uint, 8) => SampleType::U8,
+            (SampleFormat::Uint, 16) => SampleType::U16,
+            (SampleFormat::Uint, 32) => SampleType::U32,
+            (SampleFormat::Uint, 64) => SampleType::U64,
+            (SampleFormat::Int, 8) => SampleType::I8,
+            (SampleFormat::Int, 16) => SampleType::I16,
+            (SampleFormat::Int, 32) => SampleType::I32,
+            (SampleFormat::Int, 64) => SampleType::I64,
+            (SampleFormat::IEEEFP, 16) => SampleType::F16,
+            (SampleFormat::IEEEFP, 32) => SampleType::F32,
+            (SampleFormat::IEEEFP, 64) => SampleType::F64,
+            _ => return None,
+        })
+    }
+}
+
+/// How numbers become shades on the page at which the decoder is.
+fn shade<R: Read + Seek>(decoder: &mut Decoder<R>) -> Option<PhotometricInterpretation> {
+    let number = decoder.find_tag_unsigned(Tag::PhotometricInterpretation).ok()?;
+    PhotometricInterpretation::from_u16(number?)
+}
+
+/// The description of the page at which the decoder is, empty if there is none; bytes that are no UTF-8 are taken
+/// as Latin 1, as old programs write the micro sign.
+pub(super) fn description<R: Read + Seek>(decoder: &mut Decoder<R>) -> String {
+    let mut buffer = ValueBuffer::empty(Type::ASCII);
+    match decoder.image_ifd().find_tag_buf(Tag::ImageDescription, &mut buffer) {
+        Ok(Some(_)) => {}
+        _ => return String::new(),
+    }
+    let bytes = buffer.as_bytes();
+    let bytes = bytes.split(|&byte| byte == 0).next().unwrap_or_default();
+    match std::str::from_utf8(bytes) {
+        Ok(text) => text.into(),
+        Err(_) => bytes.iter().map(|&byte| char::from(byte)).collect(),
+    }
+}
+
+/// A positive number in a tag of the page at which the decoder is.
+pub(super) fn positive<R: Read + Seek>(decoder: &mut Decoder<R>, tag: Tag) -> Option<f64> {
+    let number = match decoder.find_tag(tag).ok()?? {
+        Value::Rational(above, below) => f64::from(above) / f64::from(below),
+        Value::Float(value) => f64::from(value),
+        Value::Double(value) => value,
+        other => other.into_u64().ok()? as f64,
+    };
+    (number.is_finite() && number > 0.0).then_some(number)
+}

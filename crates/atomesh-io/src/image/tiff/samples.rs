@@ -1,0 +1,144 @@
+//! What a page's numbers become: one value a sample.
+
+use ::tiff::decoder::DecodingResult;
+use atomesh::image::Samples;
+
+use super::super::colour::{Values, first_of, in_place, unpacked};
+use super::super::error::ReadReason;
+use super::super::memory::Memory;
+use super::super::options::Meaning;
+use super::FORMAT;
+use super::page::Page;
+
+/// The samples of a decoded page, one value each by what values mean.
+pub(super) fn samples(
+    decoded: DecodingResult,
+    page: &Page,
+    values: &mut Values,
+) -> Result<Samples, ReadReason> {
+    let channels = page.channels();
+    let stored = match decoded {
+        DecodingResult::U8(v) => Samples::U8(whole_bytes(v, page, values.meaning)),
+        DecodingResult::U16(v) => Samples::U16(v),
+        DecodingResult::U32(v) => Samples::U32(v),
+        DecodingResult::F16(v) => Samples::F32(v.iter().map(|h| h.to_f32()).collect()),
+        DecodingResult::F32(v) => Samples::F32(v),
+        DecodingResult::F64(v) => Samples::F64(v),
+        DecodingResult::I8(v) => Samples::I8(v),
+        DecodingResult::I16(v) => Samples::I16(v),
+        DecodingResult::I32(v) => Samples::I32(v),
+        DecodingResult::U64(v) => {
+            let doubles = without_colour(v, channels)?.iter().map(|&n| n as f64).collect();
+            return Ok(Samples::F64(doubles));
+        }
+        DecodingResult::I64(v) => {
+            let doubles = without_colour(v, channels)?.iter().map(|&n| n as f64).collect();
+            return Ok(Samples::F64(doubles));
+        }
+    };
+    mixed(stored, page, values)
+}
+
+/// One value of the channels of each sample of a page.
+pub(super) fn mixed(
+    stored: Samples,
+    page: &Page,
+    values: &mut Values,
+) -> Result<Samples, ReadReason> {
+    let channels = page.channels();
+    let is_float = matches!(stored, Samples::F32(_) | Samples::F64(_));
+    if is_float && channels >= 3 && values.meaning != Meaning::Brightness {
+        values.check_floats()?;
+    }
+    Ok(match stored {
+        Samples::U8(v) => return values.of(v, channels),
+        Samples::U16(v) => return values.of(v, channels),
+        Samples::U32(v) => return values.of(v, channels),
+        Samples::F32(v) => Samples::F32(grey_floats(v, channels)),
+        Samples::F64(v) => Samples::F64(grey_floats(v, channels)),
+        Samples::I8(v) => Samples::I8(without_colour(v, channels)?),
+        Samples::I16(v) => Samples::I16(without_colour(v, channels)?),
+        Samples::I32(v) => Samples::I32(without_colour(v, channels)?),
+        other => other, // no other type is held
+    })
+}
+
+/// Samples of fewer than 8 bits, each in a byte; of pictures they are stretched to its whole range.
+fn whole_bytes(decoded: Vec<u8>, page: &Page, meaning: Meaning) -> Vec<u8> {
+    let bits = usize::from(page.color.bit_depth());
+    if bits >= 8 {
+        return decoded;
+    }
+    let factor = if meaning == Meaning::Brightness { 255 / ((1 << bits) - 1) } else { 1 };
+    unpacked(&decoded, page.width, bits).map(|value| value * factor).collect()
+}
+
+/// Grey samples without their opacity; colour is refused.
+fn without_colour<T: Copy>(interleaved: Vec<T>, channels: usize) -> Result<Vec<T>, ReadReason> {
+    match channels {
+        1 => Ok(interleaved),
+        2 => Ok(first_of::<2, T>(interleaved)),
+        _ => Err(ReadReason::Unsupported {
+            format: FORMAT,
+            found: "colour in signed integers or integers of 64 bits".into(),
+            expected: "colour in unsigned integers of 8 to 32 bits and in floats",
+        }),
+    }
+}
+
+/// Floats without their opacity, colour to Rec. 601 luminance.
+fn grey_floats<T>(interleaved: Vec<T>, channels: usize) -> Vec<T>
+where
+    T: Copy + Into<f64> + FromDouble,
+{
+    let luminance = |sample: &[T]| {
+        let [r, g, b] = [0, 1, 2].map(|c| sample[c].into());
+        T::from_double(0.299 * r + 0.587 * g + 0.114 * b)
+    };
+    match channels {
+        2 => first_of::<2, T>(interleaved),
+        3 => in_place::<3, T>(interleaved, luminance),
+        4 => in_place::<4, T>(interleaved, luminance),
+        _ => interleaved,
+    }
+}
+
+/// A float that a double can be rounded to.
+trait FromDouble {
+    /// The nearest value.
+    fn from_double(value: f64) -> Self;
+}
+
+impl FromDouble for f32 {
+    fn from_double(value: f64) -> Self {
+        value as f32
+    }
+}
+
+impl FromDouble for f64 {
+    fn from_double(value: f64) -> Self {
+        value
+    }
+}
+
+/// Puts a plane behind those that are there; the first one is taken as it is.
+pub(super) fn append(
+    volume: &mut Option<Samples>,
+    plane: Samples,
+    count: usize,
+    memory: Memory,
+) -> Result<(), ReadReason> {
+    macro_rules! extend {
+        ($($kind:ident),*) => {
+            match (volume.as_mut(), plane) {
+                $((Some(Samples::$kind(all)), Samples::$kind(more)) => {
+                    memory.grow(all, more.len(), count)?;
+                    all.extend_from_slice(&more);
+                })*
+                (_, plane) => *volume = Some(plane), // pages of one type: only the first comes here
+            }
+        };
+    }
+    extend!(U8, I8, U16, I16, U32, I32, F32, F64);
+    Ok(())
+}
