@@ -200,7 +200,7 @@ impl<const D: usize> Beside<'_, D> {
         let world = self.provenance.map_or(&[][..], |provenance| &provenance.units);
         if let Some((ratio, text)) = unit_ratio(&units, world).filter(|_| has_frame) {
             image = image.with_frame(scaled(&own, ratio)?).map_err(JobError::content)?;
-            session.note(Note { is_warning: false, file: Some(path.into()), text });
+            session.note(Note { kind: NoteKind::Change, file: Some(path.into()), text });
         }
         self.place(image, has_frame).map_err(|e| e.about(path))
     }

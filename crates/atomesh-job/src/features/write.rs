@@ -15,7 +15,7 @@ use crate::dimension::Dimension;
 use crate::error::JobError;
 use crate::files::{self, surface_format, write_bytes};
 use crate::mesh_file;
-use crate::session::{Note, Session};
+use crate::session::{Note, NoteKind, Session};
 
 /// Features of a mesh, to be written.
 struct Found<'a, const D: usize> {
@@ -160,7 +160,7 @@ fn note_lost<const D: usize>(
         lost = vec![format!("the format has no place for the fields {names}")];
     }
     for text in lost {
-        session.note(Note { is_warning: false, file: Some(path.into()), text });
+        session.note(Note { kind: NoteKind::Change, file: Some(path.into()), text });
     }
 }
 

@@ -127,7 +127,7 @@ impl<const D: usize> SampledMesh<D> for LoadedCells<D> {
     }
 
     fn provenance(&self) -> Option<&Provenance> {
-        self.provenance.as_ref()
+        Some(&self.provenance)
     }
 
     fn take_fields(&mut self) -> Vec<OwnedField<f64>> {

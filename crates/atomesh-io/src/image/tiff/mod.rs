@@ -86,7 +86,8 @@ fn read(source: Source) -> Result<LoadedImage, ReadReason> {
     notes.extend(more);
     let (spacing, unit) = size::spacing(&stack, &resolution, shape.len(), &mut notes);
     let units = if unit.is_empty() { Vec::new() } else { vec![unit; shape.len()] };
-    Ok(LoadedImage { image: image(&shape, &spacing, samples)?, units, notes })
+    let image = image(&shape, &spacing, samples)?;
+    Ok(LoadedImage { units, notes, ..image.into() })
 }
 
 /// The image of these samples, from the origin.
