@@ -55,6 +55,10 @@ pub(super) const CODEC: Codec = Codec {
 /// by LZW and 1032 by deflate.
 const DENSITY: u64 = 4096;
 
+/// Memory that a part of a file may take, however small the file is: the decoder holds a palette of 16 bits, 3 · 2¹⁶
+/// numbers, in 6 MiB.
+const LEAST_ROOM: usize = 8 << 20;
+
 /// A file with its pages compared, before the first one is decoded.
 struct File<R: Read + Seek> {
     decoder: Decoder<Patched<R>>,
@@ -73,7 +77,11 @@ fn read(source: Source) -> Result<LoadedImage, ReadReason> {
     let mut notes = Vec::new();
     file.first_page()?;
     let resolution = Resolution::of(&mut file.decoder);
-    let description = page::description(&mut file.decoder);
+    let description = page::description(&mut file.decoder).unwrap_or_else(|error| {
+        let fault = error.to_string();
+        notes.push(ReadNote::Description { source: "the image description", fault });
+        String::new()
+    });
     let stack = Stack::of(&description, &page, file.page_count, &mut notes)?;
     let planes = stack.chosen(&page, source.options.stack, &mut notes)?;
     let mut shape = vec![page.width, page.height];
@@ -136,9 +144,9 @@ impl<R: Read + Seek> File<R> {
         }
         let count = plausible_count(&[first.width, first.height, page_count], file_bytes, DENSITY)?;
         let mut limits = Limits::default();
-        limits.decoding_buffer_size = count.saturating_mul(4 * 8);
+        limits.decoding_buffer_size = count.saturating_mul(4 * 8).max(LEAST_ROOM);
         limits.intermediate_buffer_size = limits.decoding_buffer_size.saturating_add(1 << 20);
-        limits.ifd_value_size = usize::try_from(file_bytes).unwrap_or(usize::MAX);
+        limits.ifd_value_size = usize::try_from(file_bytes).unwrap_or(usize::MAX).max(LEAST_ROOM);
         let decoder = decoder.with_limits(limits);
         Ok(Self { decoder, page: first, page_count, file_bytes, memory })
     }

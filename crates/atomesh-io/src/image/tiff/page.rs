@@ -2,10 +2,10 @@
 
 use std::io::{Read, Seek};
 
-use ::tiff::ColorType;
 use ::tiff::decoder::Decoder;
 use ::tiff::decoder::ifd::Value;
 use ::tiff::tags::{PhotometricInterpretation, SampleFormat, Tag, Type, ValueBuffer};
+use ::tiff::{ColorType, TiffError};
 
 use super::super::error::ReadReason;
 use super::super::sample_type::SampleType;
@@ -119,18 +119,20 @@ fn shade<R: Read + Seek>(decoder: &mut Decoder<R>) -> Option<PhotometricInterpre
 
 /// The description of the page at which the decoder is, empty if there is none; bytes that are no UTF-8 are taken
 /// as Latin 1, as old programs write the micro sign.
-pub(super) fn description<R: Read + Seek>(decoder: &mut Decoder<R>) -> String {
+///
+/// # Errors
+/// What the decoder says of one that cannot be read.
+pub(super) fn description<R: Read + Seek>(decoder: &mut Decoder<R>) -> Result<String, TiffError> {
     let mut buffer = ValueBuffer::empty(Type::ASCII);
-    match decoder.image_ifd().find_tag_buf(Tag::ImageDescription, &mut buffer) {
-        Ok(Some(_)) => {}
-        _ => return String::new(),
+    if decoder.image_ifd().find_tag_buf(Tag::ImageDescription, &mut buffer)?.is_none() {
+        return Ok(String::new());
     }
     let bytes = buffer.as_bytes();
     let bytes = bytes.split(|&byte| byte == 0).next().unwrap_or_default();
-    match std::str::from_utf8(bytes) {
+    Ok(match std::str::from_utf8(bytes) {
         Ok(text) => text.into(),
         Err(_) => bytes.iter().map(|&byte| char::from(byte)).collect(),
-    }
+    })
 }
 
 /// A positive number in a tag of the page at which the decoder is.

@@ -329,3 +329,11 @@ fn labels_of_a_palette_are_its_indices() {
     let colours = meant(&file, Meaning::LabelsByColour).unwrap();
     assert_eq!(*colours.image.samples(), Samples::U32(vec![3, 2, 1, 2]));
 }
+
+#[test]
+fn a_long_description_of_a_small_image_counts() {
+    let long = format!("ImageJ=1\nimages=1\nunit=um\n{}", "info=long \n".repeat(50));
+    let entries = [text(&long), ratio(282, 4, 1), ratio(283, 4, 1)];
+    let loaded = load(&pages(1, &[&[1]], &entries), StackOptions::default()).unwrap();
+    assert_eq!((loaded.image.spacing(), loaded.units[0].as_str()), (vec![0.25; 2], "um"));
+}
