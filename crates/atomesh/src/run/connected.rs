@@ -82,6 +82,9 @@ const TRIED_ANGLE: [f64; 2] = [25.0, 15.0];
 /// How far from bad cells what is held is given free, time after time, in rings of cells around them.
 const RELEASES: [usize; 3] = [0, 1, 3];
 
+/// More cells below the floor than so many, and than this share of all, tell of a floor out of reach.
+const MANY: (usize, f64) = (100, 0.05);
+
 /// How many rings of cells more are improved then.
 const AROUND: usize = 2;
 
@@ -113,11 +116,13 @@ fn improve_around<const D: usize>(
     let held = Held { freedom: &freedom, facets: &held, near: None };
     let (mut mesh, mut report) = improver.improve(mesh, held, fields, &tried, watch)?;
     for rings in RELEASES {
-        let is_released = widened(&mesh, corners_of_bad_cells(&mesh, options.min_angle), rings);
-        if !is_released.contains(&true) {
-            (report.below, report.floor_held) = (0, true);
-            break;
+        let (is_bad, count) = corners_of_bad_cells(&mesh, options.min_angle);
+        (report.below, report.floor_held) = (count, count == 0);
+        let is_out_of_reach = count > MANY.0 && count as f64 > MANY.1 * mesh.cell_count() as f64;
+        if count == 0 || is_out_of_reach {
+            break; // without features it would be out of reach too
         }
+        let is_released = widened(&mesh, is_bad, rings);
         let near = widened(&mesh, is_released.clone(), AROUND);
         let mut held = facets(&mesh);
         held.retain(|facet| !facet.iter().any(|&corner| is_released[corner as usize]));
@@ -136,12 +141,12 @@ fn improve_around<const D: usize>(
     Ok((mesh, report))
 }
 
-/// The corners of cells with an angle below the floor.
-fn corners_of_bad_cells<const D: usize>(mesh: &Mesh<D>, floor: f64) -> Vec<bool> {
+/// The corners of cells with an angle below the floor, and how many such cells there are.
+fn corners_of_bad_cells<const D: usize>(mesh: &Mesh<D>, floor: f64) -> (Vec<bool>, usize) {
     let is_bad = |cell: &[u32]| cell_shape(&mesh.simplex(cell).edges()).least_angle < floor;
     let mut is_near = vec![false; mesh.points().len()];
-    mark(mesh, &mut is_near, |_, cell| is_bad(cell));
-    is_near
+    let count = mark(mesh, &mut is_near, |_, cell| is_bad(cell));
+    (is_near, count)
 }
 
 /// The marked points and, `rings` times, the corners of the cells around them.
@@ -153,13 +158,14 @@ fn widened<const D: usize>(mesh: &Mesh<D>, mut marks: Vec<bool>, rings: usize) -
     marks
 }
 
-/// Marks the corners of some cells.
+/// Marks the corners of some cells, and says how many cells they are.
 fn mark<const D: usize>(
     mesh: &Mesh<D>,
     marks: &mut [bool],
     is_wanted: impl Fn(&[bool], &[u32]) -> bool + Sync,
-) {
+) -> usize {
     let cells = mesh.corners().par_chunks_exact(D + 1).with_min_len(1 << 10);
     let found: Vec<&[u32]> = cells.filter(|cell| is_wanted(marks, cell)).collect();
-    found.into_iter().flatten().for_each(|&corner| marks[corner as usize] = true);
+    found.iter().copied().flatten().for_each(|&corner| marks[corner as usize] = true);
+    found.len()
 }

@@ -81,6 +81,17 @@ pub enum RunError {
         /// The least nominal distance of the run.
         least: f64,
     },
+    /// Features could not be looked for in memory.
+    #[error(
+        "about {} of memory needed to find features, {} available; --crop or a coarser image would need less",
+        bytes(*.needed), bytes(*.available)
+    )]
+    FeatureMemory {
+        /// Bytes expected.
+        needed: u64,
+        /// Bytes allowed.
+        available: u64,
+    },
     /// The potential could not be made.
     #[error(transparent)]
     Enhance(#[from] EnhanceError),
@@ -199,6 +210,32 @@ pub enum Warning {
         /// The share of all features' length, in space of their area.
         share: f64,
         /// A place on the strongest of them, in world coordinates.
+        place: String,
+    },
+    /// A small spacing factor, with which a graded lattice is denser than asked for.
+    #[error(
+        "with the spacing factor {factor}, atoms of a lattice that varies stand wherever others leave room: edges are about {share:.2} of the nominal distance"
+    )]
+    Crowded {
+        /// The spacing factor γ.
+        factor: f64,
+        /// The length of edges over d.
+        share: f64,
+    },
+    /// Cells below the floor of angles that could not be raised.
+    #[error(
+        "{count} of {all} cells stay below the least angle of {floor} degrees, the flattest with {least:.1} near {place}: seed points near each other or near sides, a thin box or a high --min-angle leave no room"
+    )]
+    BelowFloor {
+        /// The cells below it.
+        count: usize,
+        /// All cells.
+        all: usize,
+        /// The floor, in degrees.
+        floor: f64,
+        /// The least angle, in degrees.
+        least: f64,
+        /// The middle of the cell that has it, in world coordinates.
         place: String,
     },
     /// Labels of the image that no cell has.

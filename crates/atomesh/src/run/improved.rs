@@ -9,8 +9,10 @@ use crate::features::{
     FacetField, FacetTest, FacetsOfFeature, Feature, FeatureFacetOptions, find_features,
 };
 use crate::fields::{Interpolation, NominalDistance, ScalarField};
+use crate::geometry::Point;
 use crate::image::{Samples, gaussian};
 use crate::improve::ImproveReport;
+use crate::measure::cell_shape;
 use crate::mesh::Mesh;
 use crate::mirror::MirrorReport;
 use crate::optimize::OptimizeReport;
@@ -87,7 +89,8 @@ pub(super) fn finish<const D: usize>(
     let potential_at_points = points.map(at).collect();
     let (feature_facets, not_met) = met_features(&run, &mesh);
     let followed = followed_features(&run, &mesh, watch)?;
-    let found = not_met.into_iter().chain(lost.into_iter().flatten());
+    let low = improve_report.as_ref().and_then(|report| below_floor(&run, &mesh, report));
+    let found = low.into_iter().chain(not_met).chain(lost.into_iter().flatten());
     let warnings = run.warnings().iter().cloned().chain(found).collect();
     Ok(Outcome {
         run,
@@ -114,13 +117,43 @@ fn met_features<const D: usize>(
     let Some(pieces) = run.pieces() else { return (Vec::new(), None) };
     let facets = feature_facets(mesh, pieces, run.distance());
     let Unmet { share, places, .. } = unmet(mesh, &facets, pieces, run.distance());
-    let warning = places.first().filter(|_| share >= LEAST_UNMET).map(|place| {
-        let (frame, units) = (&run.parts().frame, run.options().units);
-        let place = frame.lattice_to_world(units, place).map(|x| format!("{x:.6}"));
-        let place = place.map(|x| x.trim_end_matches('0').trim_end_matches('.').to_string());
-        Warning::NotMet { share, place: place.join(",") }
-    });
+    let warning = places.first().filter(|_| share >= LEAST_UNMET);
+    let warning = warning.map(|place| Warning::NotMet { share, place: in_world(run, place) });
     (facets, warning)
+}
+
+/// A place in world coordinates, for people.
+fn in_world<const D: usize>(run: &Prepared<D>, place: &Point<D>) -> String {
+    let (frame, units) = (&run.parts().frame, run.options().units);
+    let place = frame.lattice_to_world(units, place).map(|x| format!("{x:.6}"));
+    place.map(|x| x.trim_end_matches('0').trim_end_matches('.').to_string()).join(",")
+}
+
+/// A warning if cells stay below the floor of angles, with the place of the flattest.
+fn below_floor<const D: usize>(
+    run: &Prepared<D>,
+    mesh: &Mesh<D>,
+    report: &ImproveReport,
+) -> Option<Warning> {
+    if report.floor_held {
+        return None;
+    }
+    let cells = mesh.corners().par_chunks_exact(D + 1).with_min_len(1 << 10).enumerate();
+    let angle = |cell: &[u32]| cell_shape(&mesh.simplex(cell).edges()).least_angle;
+    let angles = cells.map(|(index, cell)| (angle(cell), index));
+    let (least, flattest) = angles.min_by(|a, b| a.0.total_cmp(&b.0).then(a.1.cmp(&b.1)))?;
+    let corners = mesh.cells().nth(flattest)?;
+    let middle = std::array::from_fn(|k| {
+        let along = corners.iter().map(|&corner| mesh.points()[corner as usize][k]);
+        along.sum::<f64>() / corners.len() as f64
+    });
+    Some(Warning::BelowFloor {
+        count: report.below,
+        all: mesh.cell_count(),
+        floor: run.options().improve.min_angle,
+        least,
+        place: in_world(run, &middle),
+    })
 }
 
 /// The facets along the valleys of b that facets are measured against, where atoms were not put on these: of b smoothed by

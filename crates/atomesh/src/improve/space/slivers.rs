@@ -19,20 +19,40 @@ pub(super) struct Effort {
     pub swaps: usize,
     pub moves: usize,
     pub rounds: usize,
+    /// Whether the floor turned out to be out of reach.
+    pub gave_up: bool,
 }
 
-/// Swaps and moves until no cell has a cosine above `cosine_limit`, or a round has changed nothing.
+/// The least number and the least share of cells below the floor that tell of a floor out of reach, not of a few bad
+/// cells, if a round mends less than a tenth of them. Floors of 15° leave 0.0001 after the first round.
+const MANY: (usize, f64) = (100, 0.02);
+
+/// Whether too many cells are left below the floor by a round, for how many there were before.
+fn is_hopeless(before: usize, left: usize, cells: usize) -> bool {
+    before > 0 && left > MANY.0 && left as f64 > MANY.1 * cells as f64 && 10 * left > 9 * before
+}
+
+/// Swaps and moves until no cell has a cosine above `cosine_limit`, a round has changed nothing, or hardly any of many
+/// cells: a floor out of reach is given up for good.
 pub(super) fn remove_slivers(
     tetrahedra: &mut Tetrahedra,
     cosine_limit: f64,
     rounds: usize,
     effort: &mut Effort,
 ) {
+    if effort.gave_up {
+        return;
+    }
     let mut slivers: Vec<u32> = Vec::new();
     for _ in 0..rounds {
+        let before = slivers.len();
         slivers.clear();
         let cells = 0..tetrahedra.slot_count();
         slivers.extend(cells.filter(|&cell| is_sliver(tetrahedra, cell, cosine_limit)));
+        effort.gave_up |= is_hopeless(before, slivers.len(), tetrahedra.slot_count() as usize);
+        if effort.gave_up {
+            return;
+        }
         let cosine = |c: u32| tetrahedra.shapes[c as usize].cosine;
         slivers.sort_by(|&a, &b| cosine(b).total_cmp(&cosine(a)));
         let before = (effort.swaps, effort.moves);
@@ -135,5 +155,20 @@ pub(super) fn remove_facet(tetrahedra: &mut Tetrahedra, cell: u32, k: usize) {
     if let Some(cells) = through_facet(tetrahedra, cell, k) {
         let beyond = tetrahedra.neighbours[cell as usize][k];
         tetrahedra.replace(&[cell, beyond], &cells);
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn many_cells_that_hardly_any_round_mends_are_given_up() {
+        // rounds of a ball of 190,000 cells, floors of 40° and 15°
+        assert!(!is_hopeless(0, 6899, 49_475)); // nothing has been tried
+        assert!(!is_hopeless(6899, 5436, 49_475));
+        assert!(is_hopeless(5436, 5276, 49_475));
+        assert!(!is_hopeless(12, 12, 49_475));
+        assert!(!is_hopeless(90, 90, 200)); // few cells take little time
     }
 }
