@@ -134,11 +134,11 @@ fn simplex_figures(shape: &ShapeReport, improved: Option<&ImproveReport>, cells:
 
 fn expectation(expected: &Expectation) -> String {
     format!(
-        "atoms  about {}\ncells  about {} {}\nmemory about {} beside the image\ntime   about {:.1} s\n",
+        "atoms  about {}\ncells  about {} {}\nmemory about {}\ntime   about {:.1} s\n",
         expected.estimate.atoms,
         expected.cell_count,
         expected.cells,
-        memory::text(expected.estimate.memory),
+        memory::text(expected.memory),
         expected.seconds,
     )
 }

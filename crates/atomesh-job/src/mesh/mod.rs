@@ -105,13 +105,15 @@ pub struct MeshSummary {
 /// What a run would take.
 #[derive(Clone, Debug)]
 pub struct Expectation {
-    /// Atoms, cells and memory.
+    /// Atoms and cells.
     pub estimate: Estimate,
+    /// Bytes that the process takes at its peak.
+    pub memory: u64,
     /// How many cells.
     pub cell_count: u64,
     /// What the cells are called.
     pub cells: &'static str,
-    /// From growth to mesh.
+    /// From the start to the mesh, without reports and files.
     pub seconds: f64,
 }
 
@@ -168,8 +170,10 @@ pub fn expect(mut run: RunConfig, session: &mut Session<'_>) -> Result<Expectati
     }
 }
 
-/// Seconds that an atom takes from growth to mesh, by dimension; a guide, from our own runs.
-const SECONDS_PER_ATOM: [f64; 2] = [5e-5, 1.2e-5];
+/// How much of each thread beyond the first is used; from our own runs.
+const SHARE_OF_THREAD: f64 = 0.7;
+/// How much more memory cells of second order take at an atom, in the plane and in space.
+const SECOND_ORDER_BYTES: [f64; 2] = [150.0, 450.0];
 
 fn expect_image<const D: usize>(
     run: &RunConfig,
@@ -178,14 +182,28 @@ fn expect_image<const D: usize>(
     session: &mut Session<'_>,
 ) -> Result<Expectation, JobError> {
     let images = MeshImages::read_fields(run, image, dimension, session)?;
+    let samples = images.image.samples();
+    // reports and pictures need the image to the end
+    let is_kept =
+        run.output.report.is_some() || run.output.html.is_some() || run.output.picture.is_some();
+    let image_bytes = if is_kept { samples.len() * samples.sample_size() } else { 0 } as u64;
     let (prepared, _) = prepare(run, images, dimension, session)?;
     let estimate = prepared.estimate();
     let (cell_count, cells) = match run.is_voronoi() {
         true => (estimate.atoms, dimension.voronoi_cells),
         false => (estimate.cells, dimension.cells),
     };
-    let seconds = (estimate.atoms as f64 * SECONDS_PER_ATOM[D - 2]).max(0.1);
-    Ok(Expectation { estimate, cell_count, cells, seconds })
+    let threads = rayon::current_num_threads() as f64;
+    let later = estimate.cpu_seconds / (1.0 + SHARE_OF_THREAD * (threads - 1.0));
+    // what is prepared has taken its time and memory already
+    let seconds = (session.elapsed().as_secs_f64() + later).max(0.1);
+    let second_order = match run.output.order {
+        Some(2) => SECOND_ORDER_BYTES[D - 2] * estimate.atoms as f64,
+        _ => 0.0,
+    };
+    let later = estimate.memory + second_order as u64 + image_bytes;
+    let memory = memory::peak().map_or(later, |peak| peak.max(later));
+    Ok(Expectation { estimate, memory, cell_count, cells, seconds })
 }
 
 /// A run from file to file whose options are known.

@@ -18,7 +18,9 @@ pub fn refusal(run: &RunConfig, error: RunError) -> JobError {
     let (input, shown) = (&run.input, run.input.shown());
     match &error {
         e if e.is_cancelled() => JobError::cancelled(),
-        RunError::Memory { .. } => JobError::memory(error).about_any(shown),
+        RunError::Memory { .. } | RunError::FeatureMemory { .. } => {
+            JobError::memory(error).about_any(shown)
+        }
         RunError::LatticeDimension { .. } => JobError::misuse(error).about_any(shown),
         RunError::Lattice(LatticeError::SeedOutside { index, .. }) => {
             outside(run, *index).about_any(shown)
@@ -42,7 +44,7 @@ pub fn refusal(run: &RunConfig, error: RunError) -> JobError {
         RunError::Region(RegionError::Label { .. }) => {
             JobError::content(error).about_any(input.labels.as_deref())
         }
-        RunError::Region(_) => JobError::content(error).about_any(input.mask.as_deref()),
+        RunError::Region(_) => JobError::content(error).about_any(input.mask_file().or(shown)),
         RunError::Distance(reason) => distance(run, reason),
         RunError::Shape { name, .. } => {
             let file = field(run, name);
@@ -97,7 +99,7 @@ fn field<'a>(run: &'a RunConfig, name: &str) -> Option<&'a Path> {
     let input = &run.input;
     let file = match name {
         "size field" => &input.size_field,
-        "mask" => &input.mask,
+        "mask" => return input.mask_file(),
         "label image" => &input.labels,
         _ => &input.beta_field,
     };

@@ -22,3 +22,4 @@ mod tests;
 pub use engine::{Energy, Engine, MakeEngine, direct_energy};
 pub use pairs::PairsEngine;
 pub use sampled::SampledEngine;
+pub(crate) use sampled::table_bytes;

@@ -14,7 +14,7 @@ use std::ops::Range;
 
 use rayon::prelude::*;
 
-use crate::fields::{FieldsView, centred_difference};
+use crate::fields::{FieldsView, NominalDistance, centred_difference};
 use crate::geometry::Point;
 use crate::image::Grid;
 
@@ -56,11 +56,32 @@ struct Span {
     count: u32,
 }
 
+/// How far φ reaches along each axis, in samples, within an image.
+fn reach<const D: usize>(distance: f64, grid: &Grid<D>) -> [isize; D] {
+    let radius = pair::CUTOFF * distance;
+    let within =
+        |k: usize| ((radius / grid.step[k]).floor() as isize).min(grid.shape[k] as isize - 1);
+    std::array::from_fn(within)
+}
+
+/// The distances that φ is tabulated for.
+fn tabulated<const D: usize>(distance: &NominalDistance<D>) -> impl Iterator<Item = f64> {
+    let (least, greatest) = (distance.least(), distance.greatest());
+    let count = ((greatest / least).ln() / TABLE_RATIO.ln()).ceil() as usize + 1;
+    (0..count).map(move |t| (least * TABLE_RATIO.powi(t as i32)).min(greatest))
+}
+
+/// About how many bytes the tables of the sampled engine take: the boxes around all.
+pub(crate) fn table_bytes<const D: usize>(grid: &Grid<D>, distance: &NominalDistance<D>) -> f64 {
+    let samples = |d: f64| -> f64 { reach(d, grid).iter().map(|&r| (2 * r + 1) as f64).product() };
+    4.0 * tabulated(distance).map(samples).sum::<f64>()
+}
+
 impl<const D: usize> Table<D> {
     fn new(distance: f64, grid: &Grid<D>) -> Self {
         let (step, strides) = (&grid.step, grid.strides());
         let radius = pair::CUTOFF * distance;
-        let reach: [isize; D] = std::array::from_fn(|k| (radius / step[k]).floor() as isize);
+        let reach = reach(distance, grid);
         let padded = reach[0] + LANES as isize;
         let mut table = Self {
             rows: Vec::new(),
@@ -88,7 +109,7 @@ impl<const D: usize> Table<D> {
             if half < 0.0 {
                 continue;
             }
-            let half = (half.sqrt() / step[0]).floor() as isize;
+            let half = ((half.sqrt() / step[0]).floor() as isize).min(reach[0]);
             offset[0] = -half;
             let start = table.values.len();
             table.values.extend((-half..=half).map(|i| {
@@ -131,13 +152,9 @@ impl<'a, const D: usize> SampledEngine<'a, D> {
     /// An engine for atoms in these fields; tabulates φ for the nominal distances there are.
     pub fn new(fields: FieldsView<'a, D>) -> Self {
         let FieldsView { potential, distance, .. } = fields;
-        let (least, greatest) = (distance.least(), distance.greatest());
-        let count = ((greatest / least).ln() / TABLE_RATIO.ln()).ceil() as usize + 1;
         let grid = potential.grid();
-        let tables = (0..count)
-            .into_par_iter()
-            .map(|t| Table::new((least * TABLE_RATIO.powi(t as i32)).min(greatest), grid))
-            .collect();
+        let distances: Vec<f64> = tabulated(distance).collect();
+        let tables = distances.into_par_iter().map(|d| Table::new(d, grid)).collect();
         Self { fields, tables, field: Vec::new(), distances: Vec::new() }
     }
 

@@ -5,6 +5,7 @@ use std::sync::Arc;
 
 use crate::conform::are_on_pieces;
 use crate::crests::Pieces;
+use crate::energy;
 use crate::fields::{Fields, FieldsView, Interpolation, NominalDistance, ScalarField};
 use crate::geometry::{Bounds, Point, compact_order};
 use crate::image::{Frame, Grid, Samples};
@@ -18,7 +19,7 @@ use crate::watch::Watch;
 
 use super::connected::Connected;
 use super::error::{RunError, Warning};
-use super::estimate::{self, Estimate};
+use super::estimate::{self, Beside, Estimate, Work};
 use super::filled::Filled;
 use super::method::Method;
 use super::options::{LatticeKind, MeshKind, MeshOptions};
@@ -137,8 +138,12 @@ impl<const D: usize> Prepared<D> {
         let Parts { method, options, grid, .. } = &*self.0;
         let filling = method.filling(options.lattice);
         let share = self.outline().map_or(1.0, Outline::mean_share);
-        let atoms = share * estimate::atoms(grid, self.distance(), filling);
-        let field = options.optimize.engine == EngineKind::Sampled;
+        let crowding = match options.lattice {
+            LatticeKind::Random => 1.0,
+            _ => estimate::crowding(self.distance(), options.spacing_factor),
+        };
+        let atoms = share * crowding * estimate::atoms(grid, self.distance(), filling);
+        let is_sampled = options.optimize.engine == EngineKind::Sampled;
         let spline = options.interpolation == Interpolation::Spline;
         let smooth = options.optimize.smoothing_steps > 0;
         // looking for crests takes two volumes and a copy of the potential
@@ -146,7 +151,7 @@ impl<const D: usize> Prepared<D> {
         // b without what atoms stand on
         let conforming = self.0.pieces.is_some();
         let copies = [
-            field,
+            is_sampled,
             spline,
             smooth,
             smooth && spline,
@@ -156,8 +161,20 @@ impl<const D: usize> Prepared<D> {
             conforming,
             conforming && spline,
         ];
-        let copies = copies.into_iter().filter(|&c| c).count();
-        Estimate::new::<D>(grid.sample_count(), atoms, 1 + copies)
+        let pieces = [self.pieces(), self.faced()];
+        let beside = Beside {
+            samples: grid.sample_count(),
+            copies: 1 + copies.into_iter().filter(|&c| c).count(),
+            feature_points: pieces.into_iter().flatten().map(Pieces::point_count).sum(),
+            tables: if is_sampled { energy::table_bytes(grid, self.distance()) } else { 0.0 },
+        };
+        let work = match options.kind {
+            MeshKind::Voronoi => Work::Divided,
+            MeshKind::Delaunay if conforming => Work::Conforming,
+            MeshKind::Delaunay if self.stays_still() => Work::AsGrown,
+            MeshKind::Delaunay => Work::Moved,
+        };
+        Estimate::new::<D>(work, atoms, beside)
     }
 
     /// Fills the box with atoms.
@@ -251,13 +268,19 @@ impl<const D: usize> Prepared<D> {
         options.kind == MeshKind::Voronoi && options.mirror && outline.is_none()
     }
 
+    /// Whether nothing pulls atoms.
+    fn stays_still(&self) -> bool {
+        let FieldsView { potential, weight, .. } = self.fields();
+        weight.as_constant() == Some(0.0) || potential.range() == (0.0, 0.0)
+    }
+
     /// Whether atoms stay as they were grown: nothing pulls them, and they are evened out already.
     pub(super) fn stays_as_grown(&self) -> bool {
         let Parts { method, options, outline, .. } = &*self.0;
-        let FieldsView { potential, weight, distance } = self.fields();
+        let distance = self.distance();
         let is_crystal = options.lattice != LatticeKind::Random && outline.is_none();
         let is_even = is_crystal && method.evening().is_some() && !distance.is_constant();
-        is_even && (weight.as_constant() == Some(0.0) || potential.range() == (0.0, 0.0))
+        is_even && self.stays_still()
     }
 }
 

@@ -159,6 +159,11 @@ impl<const D: usize> Pieces<D> {
         cleanness(points, grid)
     }
 
+    /// How many points all pieces have.
+    pub(crate) fn point_count(&self) -> usize {
+        self.points.len()
+    }
+
     /// How many pieces there are.
     pub fn len(&self) -> usize {
         self.strengths.len()
