@@ -118,7 +118,7 @@ fn run<const D: usize>(
     dimension: &Dimension<D>,
     session: &mut Session<'_>,
 ) -> Result<EnhanceSummary, JobError> {
-    let image = request.frame.place(image).map_err(|e| e.about(&request.image))?;
+    let image = images::place(image, &request.frame, Some(&request.image), session)?;
     memory::check_potential(image.samples().len(), "enhance")
         .map_err(|e| e.about(&request.image))?;
     let units = request.units.unwrap_or_default();

@@ -2,11 +2,11 @@
 
 use std::path::Path;
 
-use atomesh::image::{Frame, Image};
+use atomesh::image::{Frame, Image, Samples};
 use atomesh::watch::Watch;
 use atomesh_io::image::{
-    ImageFormat, LoadedImage, Meaning, ReadError, ReadNote, ReadOptions, ReadReason, SampleFormat,
-    SeriesError, load_image, metres,
+    AnyImage, ImageFormat, LoadedImage, Meaning, ReadError, ReadNote, ReadOptions, ReadReason,
+    SampleFormat, SeriesError, load_image, metres,
 };
 use atomesh_io::mesh::Provenance;
 
@@ -96,6 +96,14 @@ pub fn read(
             session.note(note);
         }
     }
+    if let Some(absent) = loaded.absent.take() {
+        let absent = absent.into_iter().map(|flag| flag != 0).collect();
+        let image = match loaded.image {
+            AnyImage::Flat(image) => image.with_absent(absent).map(AnyImage::Flat),
+            AnyImage::Volume(image) => image.with_absent(absent).map(AnyImage::Volume),
+        };
+        loaded.image = image.map_err(|e| JobError::content(e).about(&path))?;
+    }
     Ok(loaded)
 }
 
@@ -138,6 +146,26 @@ pub fn words(note: &ReadNote) -> String {
         _ => return note.to_string(),
     };
     format!("{note} ({advice})")
+}
+
+/// The image in the frame of the options, cropped, without NaN; a note says what was put in its place.
+///
+/// # Errors
+/// [`JobError`] if the options do not fit the image, or samples are NaN and there is no value for them.
+pub(crate) fn place<const D: usize>(
+    image: Image<D>,
+    options: &FrameOptions,
+    file: Option<&Path>,
+    session: &mut Session<'_>,
+) -> Result<Image<D>, JobError> {
+    let nan = options.fill.map(|fill| (fill, image.samples().range().nan_count));
+    if let Some((fill, count)) = nan.filter(|(_, count)| *count > 0) {
+        let text = format!(
+            "{count} samples are NaN: they count as places without data, and where a value is needed it is {fill}"
+        );
+        session.note(Note { kind: NoteKind::Change, file: file.map(Path::to_path_buf), text });
+    }
+    options.place(image).map_err(|e| e.about_any(file))
 }
 
 /// What an image that is read for a mesh is to the mesh.
@@ -202,19 +230,36 @@ impl<const D: usize> Beside<'_, D> {
             image = image.with_frame(scaled(&own, ratio)?).map_err(JobError::content)?;
             session.note(Note { kind: NoteKind::Change, file: Some(path.into()), text });
         }
-        self.place(image, has_frame).map_err(|e| e.about(path))
+        self.place(image, has_frame, path, session)
     }
 
-    fn place(&self, image: Image<D>, has_frame: bool) -> Result<Image<D>, JobError> {
+    fn place(
+        &self,
+        image: Image<D>,
+        has_frame: bool,
+        path: &Path,
+        session: &mut Session<'_>,
+    ) -> Result<Image<D>, JobError> {
         let keeps_own = has_frame && self.role == ImageRole::Property;
         let known = self.frame.filter(|f| !keeps_own && f.shape() == image.frame().shape());
         let frame = *known.unwrap_or(image.frame());
-        let image = image.with_frame(frame).map_err(JobError::content)?;
+        let image = image.with_frame(frame).map_err(|e| JobError::content(e).about(path))?;
         match self.role {
-            ImageRole::Followed => self.options.place(image),
-            ImageRole::Property => self.options.place_as_is(image),
+            ImageRole::Followed => place(image, self.options, Some(path), session),
+            ImageRole::Property => {
+                self.options.place_as_is(blank(image)).map_err(|e| e.about(path))
+            }
         }
     }
+}
+
+/// The image with NaN where it has no data.
+fn blank<const D: usize>(image: Image<D>) -> Image<D> {
+    let Some(absent) = image.absent().map(<[bool]>::to_vec) else { return image };
+    let (frame, samples) = image.into_parts();
+    let mut values: Vec<f64> = (0..samples.len()).map(|i| samples.get(i)).collect();
+    values.iter_mut().zip(absent).filter(|(_, a)| *a).for_each(|(v, _)| *v = f64::NAN);
+    Image::new(frame, Samples::F64(values)).expect("there are as many samples as before")
 }
 
 /// Whether pictures show z upwards: it grows that way in the image's format, and along its last axis.

@@ -100,11 +100,13 @@ impl<'a> FeatureFiles<'a> {
                 (dimension.files.surface)(path, mesh, &found.groups(), Some(&means), session);
             written.map_err(|e| JobError::from(e).about(path))?;
         }
-        if let Some(path) = &files::stage_any(&self.request.mesh_output, group)? {
+        if let (Some(path), Some(named)) =
+            (&files::stage_any(&self.request.mesh_output, group)?, &self.request.mesh_output)
+        {
             let tags = self.tags(loaded, found, dimension.tools)?;
             let format = MeshFormat::of(path).map_err(JobError::misuse)?;
             let (data, lost) = tagged(loaded, &tags);
-            note_lost(loaded, lost, path, session);
+            note_lost(loaded, lost, named, session);
             let written = (dimension.files.mesh)(path, format, &data, session);
             written.map_err(|e| JobError::from(e).about(path))?;
         }

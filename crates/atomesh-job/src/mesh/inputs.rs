@@ -2,7 +2,7 @@
 
 use std::path::{Path, PathBuf};
 
-use atomesh::image::{Between, Frame, Image};
+use atomesh::image::{Between, Frame, Image, Samples as SampleValues};
 use atomesh::run::Inputs;
 use atomesh_io::image::{LoadedImage, Meaning, ReadOptions};
 
@@ -95,7 +95,7 @@ impl<const D: usize> MeshImages<D> {
         let input = &run.input;
         let shown = input.shown();
         let of = Samples::of(&image, units, run).map_err(|e| e.about_any(shown))?;
-        let image = run.frame.place(image).map_err(|e| e.about_any(shown))?;
+        let image = images::place(image, &run.frame, shown, session)?;
         run.mesh_options::<D>()?;
         memory::check_potential(image.samples().len(), "mesh").map_err(|e| e.about_any(shown))?;
         let mut field = |path: &Option<PathBuf>, kind: FieldKind| {
@@ -104,13 +104,20 @@ impl<const D: usize> MeshImages<D> {
         };
         let size_field = field(&input.size_field, FieldKind::values(None))?;
         let weight_field = field(&input.beta_field, FieldKind::values(None))?;
-        let mask = field(&input.mask, FieldKind::whole(Meaning::Mask))?;
+        let mask = match input.masks_absent() {
+            true => None,
+            false => field(&input.mask, FieldKind::whole(Meaning::Mask))?,
+        };
         let labels = field(&input.labels, FieldKind::whole(Meaning::Labels))?;
         // without IMAGE, the potential is the image; outside of its file there are no features
         let no_feature = FieldKind::values(Some(0.0));
         let potential =
             if input.image.is_some() { field(&input.potential, no_feature)? } else { None };
         let is_potential = input.potential.is_some() && potential.is_none();
+        let mask = match input.masks_absent() {
+            true => live_mask(&image, shown, session),
+            false => mask,
+        };
         let Samples { units, .. } = of;
         Ok(Self { image, is_potential, potential, size_field, weight_field, mask, labels, units })
     }
@@ -194,6 +201,22 @@ impl<const D: usize> Samples<D> {
             placed != own || run.input.shown().is_some_and(|path| is_placed(path, &own));
         Ok(Self { own, placed, is_placed, units })
     }
+}
+
+/// 1 where the image has data; `None` with a note if it has data everywhere.
+fn live_mask<const D: usize>(
+    image: &Image<D>,
+    shown: Option<&Path>,
+    session: &mut Session<'_>,
+) -> Option<Image<D>> {
+    let Some(absent) = image.absent() else {
+        let text = "all samples have data; --mask live leaves nothing out".into();
+        session.note(Note { kind: NoteKind::Change, file: shown.map(Path::to_path_buf), text });
+        return None;
+    };
+    let live = absent.iter().map(|&is_absent| u8::from(!is_absent)).collect();
+    let mask = Image::new(*image.frame(), SampleValues::U8(live));
+    Some(mask.expect("the image has a flag for each sample"))
 }
 
 /// Reads an image that belongs to the samples of the first: it is placed by its own frame where there is one, else by its

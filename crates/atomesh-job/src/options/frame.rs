@@ -44,7 +44,8 @@ section! {
         /// Box of interest in world coordinates, rounded outward to whole samples
         #[arg(long, value_name = "X0..X1,Y0..Y1[,Z0..Z1]", allow_hyphen_values = true)]
         pub crop: Text<WorldBox>,
-        /// Value that replaces NaN samples. Default: NaN samples are an error
+        /// Value that NaN samples are written and drawn as; they count as places without data, which are no features.
+        /// Default: NaN samples are an error
         #[arg(long, value_name = "VALUE", allow_hyphen_values = true,
             value_parser = number_in(f64::MIN, f64::MAX, "a finite number"))]
         pub fill: f64,
@@ -189,7 +190,7 @@ impl FrameOptions {
         Err(JobError::content(message).advise("--fill VALUE puts a number in their place"))
     }
 
-    /// The image in the frame of the options, cropped; NaN stays unless there is a value for it.
+    /// The image in the frame of the options, cropped; NaN stays unless there is a value for it, and has no data then.
     pub fn place_as_is<const D: usize>(&self, image: Image<D>) -> Result<Image<D>, JobError> {
         let frame = self.apply(*image.frame())?;
         let mut image = image.with_frame(frame).map_err(JobError::content)?;
@@ -197,10 +198,17 @@ impl FrameOptions {
             let (start, end) = crop.samples(&frame).map_err(JobError::misuse)?;
             image = image.crop(start, end).map_err(JobError::misuse)?;
         }
-        let Some(fill) = self.fill else { return Ok(image) };
+        let Some(fill) = self.fill.filter(|_| image.samples().range().nan_count > 0) else {
+            return Ok(image);
+        };
+        let is_nan = |index: usize| image.samples().get(index).is_nan();
+        let before = image.absent();
+        let is_absent = |index: usize| is_nan(index) || before.is_some_and(|flags| flags[index]);
+        let absent = (0..image.samples().len()).map(is_absent).collect();
         let (frame, mut samples) = image.into_parts();
         samples.fill_nan(fill);
-        Image::new(frame, samples).map_err(JobError::content)
+        let filled = Image::new(frame, samples).and_then(|image| image.with_absent(absent));
+        filled.map_err(JobError::content)
     }
 }
 

@@ -31,8 +31,9 @@ section! {
         #[arg(long, value_name = "FILE", conflicts_with = "beta")]
         pub beta_field: PathBuf,
         /// Mask, an image over IMAGE: mesh only where it is not 0 (where it is at least 0.5, if
-        /// its values are shares from 0 to 1), up to its smooth outline
-        #[arg(long, value_name = "FILE")]
+        /// its values are shares from 0 to 1), up to its smooth outline. Features end there. Or the word live: mesh
+        /// only where IMAGE has data (traces that are neither missing nor dead, samples that are not NaN)
+        #[arg(long, value_name = "FILE|live")]
         pub mask: PathBuf,
         /// Labels, an image of integers over IMAGE: each cell gets the label that covers most
         /// of it, and facets between two labels are tagged, as interface-2-5. Without IMAGE, or with
@@ -42,23 +43,34 @@ section! {
     }
 }
 
+/// Whether a mask is the word for where the image has data; a file of that name is `./live`.
+fn is_live(mask: &Path) -> bool {
+    mask.as_os_str() == "live"
+}
+
 impl InputOptions {
     pub(crate) fn files_mut(&mut self) -> [Option<&mut PathBuf>; 6] {
         let Self { image, potential, size_field, beta_field, mask, labels } = self;
-        [image, potential, size_field, beta_field, mask, labels].map(Option::as_mut)
+        let mask = mask.as_mut().filter(|mask| !is_live(mask));
+        let [image, potential, size_field, beta_field, labels] =
+            [image, potential, size_field, beta_field, labels].map(Option::as_mut);
+        [image, potential, size_field, beta_field, mask, labels]
+    }
+
+    /// The file of the mask, if it is one.
+    pub fn mask_file(&self) -> Option<&Path> {
+        self.mask.as_deref().filter(|mask| !is_live(mask))
+    }
+
+    /// Whether the mesh is to end where the image's data do.
+    pub fn masks_absent(&self) -> bool {
+        self.mask.as_deref().is_some_and(is_live)
     }
 
     /// All files that are read.
     pub fn paths(&self) -> impl Iterator<Item = &Path> {
-        let all = [
-            &self.image,
-            &self.potential,
-            &self.size_field,
-            &self.beta_field,
-            &self.mask,
-            &self.labels,
-        ];
-        all.into_iter().flatten().map(PathBuf::as_path)
+        let all = [&self.image, &self.potential, &self.size_field, &self.beta_field, &self.labels];
+        all.into_iter().flatten().map(PathBuf::as_path).chain(self.mask_file())
     }
 
     /// The file of the image that gives the frame: the potential or the labels where there is no other.

@@ -36,7 +36,7 @@ pub use options::{EdgeOperator, FeatureOptions, Features};
 pub use thin::{CrestOptions, FaultOptions, HorizonOptions, Polarity};
 
 use crate::crests::FeaturePoint;
-use crate::image::{Grid, Image, Samples};
+use crate::image::{Grid, Image, Samples, Units};
 use crate::watch::{Cancelled, Phase, Watch, check};
 use rayon::prelude::*;
 use scale::UnitSamples;
@@ -57,7 +57,8 @@ pub struct Enhanced<const D: usize> {
     pub crests: Option<Vec<FeaturePoint<D>>>,
 }
 
-/// Makes the potential b(x) of an image, in units of 1.
+/// Makes the potential b(x) of an image, in units of 1. Samples without data ([`Image::absent`]) count as what is beside
+/// them, and are no features: b is 0 there.
 ///
 /// # Errors
 /// [`EnhanceError`] for samples that are not finite, labels that are not integers, options out of their ranges, and if
@@ -85,6 +86,9 @@ pub fn enhance<const D: usize>(
     if let Some(image) = denoised(image, options, watch)? {
         return enhance(&image, &FeatureOptions { denoise: None, ..*options }, watch);
     }
+    if let Some(continued) = image.continued() {
+        return Ok(enhance(&continued, options, watch)?.within(image, options.units));
+    }
     let unit = UnitSamples::new(image.samples())?;
     check(watch, Phase::Potential, 0.1, None)?;
     match options.features {
@@ -92,6 +96,37 @@ pub fn enhance<const D: usize>(
         _ if options.thins() => thin::thinned(image, options, watch),
         _ => scale::scaled(&unit, image, options, watch),
     }
+}
+
+impl<const D: usize> Enhanced<D> {
+    /// The same without what was found at samples where the image has no data.
+    fn within(mut self, image: &Image<D>, units: Units) -> Self {
+        let Some(absent) = image.absent() else { return self };
+        let all = self.values.par_iter_mut().zip(absent);
+        all.filter(|(_, is_absent)| **is_absent).for_each(|(b, _)| *b = 0.0);
+        if let Some(crests) = &mut self.crests {
+            keep_present(crests, &image.frame().grid(units), absent);
+        }
+        self.constant |= self.values.par_iter().all(|&b| b == 0.0);
+        self
+    }
+}
+
+/// Drops points, in lattice coordinates, that are nearest to samples without data.
+fn keep_present<const D: usize>(
+    points: &mut Vec<FeaturePoint<D>>,
+    grid: &Grid<D>,
+    absent: &[bool],
+) {
+    let strides = grid.strides();
+    let nearest = |point: &FeaturePoint<D>| -> usize {
+        let along = |k: usize| {
+            let place = (point.position[k] / grid.step[k]).round().max(0.0) as usize;
+            place.min(grid.shape[k] - 1) * strides[k]
+        };
+        (0..D).map(along).sum()
+    };
+    points.retain(|point| !absent[nearest(point)]);
 }
 
 /// The image without its noise; `None` if that is not asked for.
@@ -107,10 +142,9 @@ fn denoised<const D: usize>(
     UnitSamples::new(image.samples())?; // refuses what is not finite
     let denoising = DenoiseOptions { strength, ..DenoiseOptions::for_dimension(D) };
     let grid = image.frame().grid(options.units);
-    let values = image.samples().to_f32();
+    let values = image.continued().as_ref().unwrap_or(image).samples().to_f32();
     let clean = denoise(&values, &grid, &denoising, watch)?;
-    let clean = Image::new(*image.frame(), Samples::F32(clean));
-    Ok(Some(clean.expect("there is a value for each sample of the image")))
+    Ok(Some(image.clone().with_samples(Samples::F32(clean))))
 }
 
 /// Points on the features of an image, in lattice coordinates: crests between samples, whatever the potential is made
@@ -139,6 +173,13 @@ pub fn feature_points<const D: usize>(
         return feature_points(&image, &FeatureOptions { denoise: None, ..*options }, watch);
     }
     let grid = image.frame().grid(options.units);
+    if let (Some(continued), Some(absent)) = (image.continued(), image.absent()) {
+        let mut found = feature_points(&continued, options, watch)?;
+        if let Some(points) = &mut found {
+            keep_present(points, &grid, absent);
+        }
+        return Ok(found);
+    }
     let mut points = match options.features {
         Features::Labels => labels::interface_points(image, options, watch)?,
         Features::Edges => {

@@ -241,3 +241,53 @@ fn bits_do_not_depend_on_the_number_of_threads() {
     };
     assert_eq!(at(1), at(3));
 }
+
+/// Layers that dip along x, without a fault; zeros where `absent` is true.
+fn dipping_layers(shape: [usize; 3], absent: &[bool]) -> Samples {
+    let value = |i: usize| {
+        let [x, y, z] = crate::image::coordinates(i, shape).map(|x| x as f64);
+        let depth = z - 0.3 * x - 0.1 * y;
+        if absent[i] { 0.0 } else { (0.7 * depth).sin() + (1.13 * depth + 1.0).sin() }
+    };
+    Samples::F64((0..absent.len()).map(value).collect())
+}
+
+#[test]
+fn the_rim_of_what_is_absent_is_no_feature() {
+    let shape = [30, 28, 26];
+    let count = shape.iter().product();
+    // a corner beyond a slanted rim, and one column within
+    let absent: Vec<bool> = (0..count)
+        .map(|i| {
+            let [x, y, _] = crate::image::coordinates(i, shape);
+            x + y > 40 || (x, y) == (9, 12)
+        })
+        .collect();
+    let zeros = image(shape, dipping_layers(shape, &absent));
+    let faults = FeatureOptions { features: Features::Faults, ..Default::default() };
+    // taken as samples, the zeros are a fault
+    assert!(!run(&zeros, faults).constant);
+    let missing = zeros.with_absent(absent.clone()).unwrap();
+    assert!(run(&missing, faults).constant);
+    assert_eq!(feature_points(&missing, &faults, &mut Silent).unwrap().unwrap().len(), 0);
+}
+
+#[test]
+fn features_end_where_data_do_and_stay_as_they_are_elsewhere() {
+    let shape = [40, 40];
+    let grey: Vec<u8> = (0..1600).map(|i| if i % 40 < 20 { 40 } else { 200 }).collect();
+    let absent: Vec<bool> = (0..1600).map(|i| i / 40 < 12).collect();
+    let mut cut = grey.clone();
+    cut[..12 * 40].fill(255);
+    let whole = image(shape, Samples::U8(grey));
+    let part = image(shape, Samples::U8(cut)).with_absent(absent).unwrap();
+    for features in [Features::Edges, Features::Dark] {
+        let (whole, part) = (run(&whole, with(features)), run(&part, with(features)));
+        assert!(part.values[..12 * 40].iter().all(|&b| b == 0.0), "{features:?}");
+        // the image is the same in all rows, so that mirrored rows are as those that are missing
+        let same = whole.values[12 * 40..].iter().zip(&part.values[12 * 40..]);
+        same.for_each(|(a, b)| assert!((a - b).abs() < 1e-6, "{features:?}: {a} {b}"));
+    }
+    let points = feature_points(&part, &with(Features::Edges), &mut Silent).unwrap().unwrap();
+    assert!(!points.is_empty() && points.iter().all(|p| p.position[1] > 11.0), "{points:?}");
+}

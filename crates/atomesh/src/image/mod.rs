@@ -1,5 +1,6 @@
 //! Images: samples on a grid, and the frame that places the grid in the world.
 
+mod absent;
 mod cells;
 mod convolve;
 mod frame;
@@ -32,6 +33,8 @@ pub use tensor::StructureTensor;
 pub struct Image<const D: usize> {
     frame: Frame<D>,
     samples: Samples,
+    /// Whether each sample has no data, if any has none.
+    absent: Option<Vec<bool>>,
 }
 
 impl<const D: usize> Image<D> {
@@ -46,7 +49,7 @@ impl<const D: usize> Image<D> {
                 found: samples.len(),
             });
         }
-        Ok(Self { frame, samples })
+        Ok(Self { frame, samples, absent: None })
     }
 
     /// Where the samples are.
@@ -59,12 +62,21 @@ impl<const D: usize> Image<D> {
     /// # Errors
     /// [`FrameError::SampleCount`] if the shapes differ in their number of samples.
     pub fn with_frame(self, frame: Frame<D>) -> Result<Self, FrameError> {
-        Self::new(frame, self.samples)
+        Ok(Self { absent: self.absent, ..Self::new(frame, self.samples)? })
     }
 
     /// The sample values, x fastest.
     pub fn samples(&self) -> &Samples {
         &self.samples
+    }
+
+    /// Other samples at the same places; those without data stay so.
+    ///
+    /// # Panics
+    /// If there are not as many.
+    pub(crate) fn with_samples(self, samples: Samples) -> Self {
+        assert_eq!(samples.len(), self.frame.sample_count());
+        Self { samples, ..self }
     }
 
     /// The frame and the samples.
@@ -78,8 +90,10 @@ impl<const D: usize> Image<D> {
     /// [`FrameError::Crop`] if the range is empty or leaves the image.
     pub fn crop(&self, start: [usize; D], end: [usize; D]) -> Result<Self, FrameError> {
         let frame = self.frame.crop(start, end)?;
-        let rows = rows(self.frame.shape(), start, end);
-        Self::new(frame, self.samples.gather(frame.sample_count(), rows))
+        let rows = || rows(self.frame.shape(), start, end);
+        let cropped = Self::new(frame, self.samples.gather(frame.sample_count(), rows()))?;
+        let Some(absent) = &self.absent else { return Ok(cropped) };
+        cropped.with_absent(rows().flat_map(|row| &absent[row]).copied().collect())
     }
 }
 

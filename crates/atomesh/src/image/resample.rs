@@ -82,7 +82,7 @@ impl<const D: usize> Image<D> {
     pub fn reordered(self, frame: &Frame<D>, order: SampleOrder<D>) -> Self {
         if order.is_same() {
             let samples = self.into_parts().1;
-            return Self { frame: *frame, samples };
+            return Self { frame: *frame, samples, absent: None };
         }
         let (strides, shape) = (self.frame.grid(Units::Samples).strides(), frame.shape());
         let from = |index: usize| {
@@ -93,7 +93,8 @@ impl<const D: usize> Image<D> {
             };
             Some((0..D).map(along).sum())
         };
-        Self { frame: *frame, samples: self.samples.picked(frame.sample_count(), from) }
+        let samples = self.samples.picked(frame.sample_count(), from);
+        Self { frame: *frame, samples, absent: None }
     }
 
     /// The image's values at the samples of `frame`, and how many of these lie outside of the image.
@@ -123,7 +124,7 @@ impl<const D: usize> Image<D> {
                 }
             }
         };
-        (Self { frame: *frame, samples }, outside)
+        (Self { frame: *frame, samples, absent: None }, outside)
     }
 
     /// The value at a place in sample coordinates; beyond the outermost samples that of the nearest place between them.

@@ -11,11 +11,15 @@ use crate::region::{Outline, label_samples, samples_inside};
 use crate::watch::{Phase, Watch, check};
 
 use super::error::{RunError, Warning};
+use super::estimate::{crowding, feature_bytes};
 use super::find::{Found, Known, find_features};
 use super::inputs::Inputs;
 use super::method::Method;
-use super::options::{MeshKind, MeshOptions, Size};
+use super::options::{LatticeKind, MeshKind, MeshOptions, Size};
 use super::prepared::{Parts, Prepared};
+
+/// So many atoms in the place of one are said.
+const MOST_CROWDED: f64 = 1.2;
 
 /// Makes b(x), d(x) and β(x).
 pub(super) fn prepare<const D: usize>(
@@ -33,8 +37,11 @@ pub(super) fn prepare<const D: usize>(
     }
     check_frame(&frame)?;
     method.crystal(options.lattice)?; // refuse early what does not fit the dimension
+    check_memory(&inputs, &options)?;
     let mut warnings = Vec::new();
     let labels = labels(&inputs)?;
+    let within = within_mask(&inputs)?;
+    let inputs = Inputs { image: within.as_ref().unwrap_or(inputs.image), ..inputs };
     let Enhanced { values: mut samples, crests, .. } =
         enhanced(&inputs, &options, &mut warnings, watch)?;
     check(watch, Phase::Distance, 0.0, None)?;
@@ -46,6 +53,7 @@ pub(super) fn prepare<const D: usize>(
     let weight = weight(&inputs, grid, options.image_weight)?;
     let is_masked = outline.is_some();
     warnings.extend(coarse(&grid, &distance));
+    warnings.extend(crowded(&options, &distance));
     check(watch, Phase::Distance, 1.0, None)?;
     let potential = ScalarField::potential(grid, samples, options.interpolation)?;
     let (mut found, mut faced) = (Found::default(), None);
@@ -97,6 +105,22 @@ fn labels<const D: usize>(inputs: &Inputs<'_, D>) -> Result<Option<Samples>, Run
     let masked = labels.iter().zip(inside);
     let masked = masked.map(|(&label, inside)| if inside { f64::from(label) } else { f64::NAN });
     Ok(Some(Samples::F64(masked.collect())))
+}
+
+/// The image without data outside of the mask, if it holds less than all.
+fn within_mask<const D: usize>(inputs: &Inputs<'_, D>) -> Result<Option<Image<D>>, RunError> {
+    let Some(mask) = inputs.mask.filter(|_| !inputs.is_potential) else { return Ok(None) };
+    same_shape("mask", inputs.image.frame(), mask)?;
+    let mut absent = samples_inside(mask.samples())?;
+    absent.iter_mut().for_each(|flag| *flag = !*flag);
+    if !absent.contains(&true) {
+        return Ok(None);
+    }
+    if let Some(before) = inputs.image.absent() {
+        absent.iter_mut().zip(before).for_each(|(flag, before)| *flag |= before);
+    }
+    let image = inputs.image.clone().with_absent(absent);
+    Ok(Some(image.expect("the mask has the image's shape")))
 }
 
 /// Whether faces of Voronoi cells are made to fall on features.
@@ -156,6 +180,42 @@ fn coarse<const D: usize>(grid: &Grid<D>, distance: &NominalDistance<D>) -> Opti
     Some(Warning::Coarse { axis, distance, extent: extent[axis] })
 }
 
+/// A warning where the spacing factor makes edges much shorter than d.
+fn crowded<const D: usize>(
+    options: &MeshOptions<D>,
+    distance: &NominalDistance<D>,
+) -> Option<Warning> {
+    let crowding = crowding(distance, options.spacing_factor);
+    let is_grown = options.lattice != LatticeKind::Random;
+    (is_grown && crowding > MOST_CROWDED).then(|| Warning::Crowded {
+        factor: options.spacing_factor,
+        share: crowding.powf(-1.0 / D as f64),
+    })
+}
+
+/// Refuses images whose features need more memory to be found than there is.
+fn check_memory<const D: usize>(
+    inputs: &Inputs<'_, D>,
+    options: &MeshOptions<D>,
+) -> Result<(), RunError> {
+    let Some(available) = options.memory_limit else { return Ok(()) };
+    let kinds: Vec<Features> = match &options.mixture {
+        _ if inputs.is_potential => vec![Features::None],
+        Some(mixture) => mixture.shares().iter().map(|share| share.features).collect(),
+        None => vec![options.features.features],
+    };
+    let bytes = |features: &Features| {
+        feature_bytes(&FeatureOptions { features: *features, ..options.features }, kinds.len() > 1)
+    };
+    let most = kinds.iter().map(bytes).fold(0.0, f64::max);
+    // b beside what makes it
+    let needed = ((4.0 + most) * inputs.image.samples().len() as f64) as u64;
+    if needed > available {
+        return Err(RunError::FeatureMemory { needed, available });
+    }
+    Ok(())
+}
+
 /// Refuses samples so far from 0 that points between them would fall together.
 fn check_frame<const D: usize>(frame: &Frame<D>) -> Result<(), RunError> {
     /// How far apart numbers may be, over the least spacing.
@@ -205,7 +265,9 @@ fn enhanced<const D: usize>(
     watch: &mut dyn Watch,
 ) -> Result<Enhanced<D>, RunError> {
     if inputs.is_potential {
-        let values = enhance::given_potential(inputs.image.samples().clone())?;
+        let mut values = enhance::given_potential(inputs.image.samples().clone())?;
+        let absent = inputs.image.absent().unwrap_or_default();
+        values.iter_mut().zip(absent).filter(|(_, a)| **a).for_each(|(b, _)| *b = 0.0);
         return Ok(Enhanced { values, constant: false, crests: None });
     }
     let smooth = options.features.smooth.or_else(|| width_for_faces(inputs, options));
@@ -269,7 +331,8 @@ fn nominal_distance<const D: usize>(
         }
         Size::Wavelength { frequency, points } => {
             let rate = (frequency * points) as f32;
-            let mut lengths = inputs.image.samples().to_f32();
+            let continued = inputs.image.continued();
+            let mut lengths = continued.as_ref().unwrap_or(inputs.image).samples().to_f32();
             lengths.iter_mut().for_each(|v| *v /= rate);
             NominalDistance::from_field(grid, &lengths, GRADIENT_LIMIT)?
         }
