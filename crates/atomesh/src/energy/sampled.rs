@@ -395,3 +395,29 @@ impl<const D: usize> Engine<D> for SampledEngine<'_, D> {
         &self.distances
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::fields::{Fields, ImageWeight, Interpolation, ScalarField};
+
+    #[test]
+    fn tables_end_where_the_image_does() {
+        let grid = Grid { shape: [60, 6], step: [1.0; 2] };
+        let fields = |distance: f64| {
+            let potential =
+                ScalarField::potential(grid, vec![0.0; 360], Interpolation::Linear).unwrap();
+            let distance = NominalDistance::constant(&grid, distance).unwrap();
+            Fields::new(potential, ImageWeight::constant(0.5).unwrap(), distance).unwrap()
+        };
+        let far = fields(1e4);
+        // rows from −59 to 59, filled up to 120, at 11 offsets along y
+        let engine = SampledEngine::new(far.view());
+        assert_eq!(engine.tables[0].values.len(), 11 * 120);
+        assert_eq!(table_bytes(&grid, far.view().distance), 4.0 * 11.0 * 119.0);
+        // a table that ends within the image is as it was
+        let near = fields(3.0);
+        let whole = SampledEngine::new(near.view());
+        assert_eq!(whole.tables[0].reach, [4, 4]);
+    }
+}

@@ -556,3 +556,63 @@ fn a_watch_ends_a_run_in_every_phase() {
     }
     assert!(calls > 8, "{calls}"); // some for each of potential, distance, growth, optimizer, connection
 }
+
+#[test]
+fn small_spacing_factors_are_forecast_and_said() {
+    fn check<const D: usize>(method: &Method<D>, shape: [usize; D], factors: &[f64]) {
+        let image = sheet(Frame::new(shape).unwrap());
+        let size = Size::Range { min: 4.0, max: 12.0 };
+        for &spacing_factor in factors {
+            let options = MeshOptions { size, spacing_factor, ..Default::default() };
+            let prepared = prepare(method, Inputs::image(&image), options, &mut Silent).unwrap();
+            let is_said = prepared.warnings().iter().any(|w| matches!(w, Warning::Crowded { .. }));
+            assert!(is_said, "{D} {spacing_factor}");
+            let estimate = prepared.estimate().atoms as f64;
+            let actual = prepared.fill(&mut Silent).unwrap().lattice().len() as f64;
+            // how crystals of all sizes meet differs from image to image
+            let share = estimate / actual;
+            assert!((0.7..1.4).contains(&share), "{D} {spacing_factor}: {estimate} for {actual}");
+        }
+    }
+    check(&Method::plane(), [64, 64], &[0.15, 0.3, 0.5]);
+    check(&Method::space(), [26, 24, 24], &[0.3, 0.5]);
+    // where d is constant, sites are those of one crystal
+    let image = sheet(Frame::new([64, 64]).unwrap());
+    let options = MeshOptions { spacing_factor: 0.3, ..sized(4.0) };
+    let prepared = prepare(&Method::plane(), Inputs::image(&image), options, &mut Silent).unwrap();
+    assert!(prepared.warnings().iter().all(|w| !matches!(w, Warning::Crowded { .. })));
+}
+
+#[test]
+fn features_that_would_not_fit_are_refused_before_they_are_looked_for() {
+    let image = sheet(Frame::new([60, 60]).unwrap());
+    let features = FeatureOptions { features: Features::Faults, ..Default::default() };
+    // b alone takes 4 bytes a sample, faults 22 more
+    let options = MeshOptions { features, memory_limit: Some(20 * 3600), ..sized(4.0) };
+    let mut phases = Vec::new();
+    let mut watch = |phase: Phase, _: f64, _: Option<f64>| {
+        phases.push(phase);
+        std::ops::ControlFlow::Continue(())
+    };
+    let error = prepare(&Method::plane(), Inputs::image(&image), options, &mut watch).err();
+    assert!(matches!(error, Some(RunError::FeatureMemory { available: 72_000, .. })), "{error:?}");
+    assert!(phases.is_empty(), "{phases:?}");
+}
+
+#[test]
+fn cells_below_the_floor_are_said_with_their_number_and_place() {
+    // two seed points near each other, fixed: no angle of 20° fits between them and a side
+    let image = sheet(Frame::new([40, 40]).unwrap());
+    let seed_points = vec![[20.0, 0.6], [22.0, 0.2]];
+    let options = MeshOptions { seed_points, ..sized(8.0) };
+    let outcome = run(&Method::plane(), &image, options).unwrap();
+    let found = outcome.warnings().iter().find_map(|warning| match warning {
+        Warning::BelowFloor { count, least, place, .. } => Some((*count, *least, place.clone())),
+        _ => None,
+    });
+    let (count, least, place) = found.expect("the floor cannot be kept");
+    assert_eq!(count, outcome.improve_report().unwrap().below);
+    assert!(least < 20.0 && count > 0);
+    let y: f64 = place.split(',').nth(1).unwrap().parse().unwrap();
+    assert!(y < 3.0, "{place}");
+}
