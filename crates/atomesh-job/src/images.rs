@@ -267,3 +267,22 @@ pub(crate) fn is_z_up<const D: usize>(path: Option<&Path>, frame: &Frame<D>) -> 
     let format = path.and_then(ImageFormat::of);
     format.is_some_and(ImageFormat::z_is_height) && frame.direction()[D - 1][D - 1] > 0.0
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn notes_and_refusals_name_the_option_that_decides_otherwise() {
+        let note = ReadNote::TimeScalar { trace: 1, scalar: 37 };
+        assert_eq!(words(&note), format!("{note} (--origin says otherwise)"));
+        assert_eq!(words(&ReadNote::Feet), ReadNote::Feet.to_string());
+        let folder = tempfile::tempdir().unwrap();
+        let path = folder.path().join("a.nhdr");
+        let text =
+            "NRRD0004\ntype: uchar\ndimension: 2\nsizes: 2 2\nencoding: raw\ndata file: ../b\n";
+        std::fs::write(&path, text).unwrap();
+        let error = load(&path, &ReadOptions::default(), &mut atomesh::watch::Silent).unwrap_err();
+        assert!(error.advice().is_some_and(|advice| advice.contains("--data-root")), "{error}");
+    }
+}
