@@ -41,9 +41,12 @@ pub fn catch_signals() {
     use std::sync::Arc;
     use std::sync::atomic::AtomicBool;
 
-    use signal_hook::consts::{SIGHUP, SIGINT, SIGTERM, SIGXFSZ};
+    use signal_hook::consts::{SIGABRT, SIGHUP, SIGINT, SIGTERM, SIGXFSZ};
     // a file that grows past the system's limit is then an error of the write
     let _ = signal_hook::flag::register(SIGXFSZ, Arc::<AtomicBool>::default());
+    // an allocation that fails aborts, once it has said how many bytes it wanted: a failure as others
+    let always = Arc::new(AtomicBool::new(true));
+    let _ = signal_hook::flag::register_conditional_shutdown(SIGABRT, 1, always);
     // `nohup` lets the work outlive its terminal
     let hangup = (!is_ignored(SIGHUP)).then_some(SIGHUP);
     // without a handler the system ends the process, which is no worse than failing to start

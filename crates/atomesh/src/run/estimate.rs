@@ -64,12 +64,20 @@ pub(super) struct Beside {
     pub feature_points: usize,
     /// Bytes of the sampled engine's tables; 0 for other engines.
     pub tables: f64,
+    /// How many atoms there are for each that d asks for: so many times the neighbours has each.
+    pub crowding: f64,
 }
 
 /// Bytes that a point of a feature takes, with the grid that finds it.
 const FEATURE_POINT_BYTES: f64 = 160.0;
 /// Processor seconds that the sampled engine takes for each sample: some hundred evaluations.
 const SAMPLED_SECONDS: f64 = 4.4e-7;
+/// Neighbours of an atom in a lattice as dense as d asks for, listed, in the plane and in space.
+const NEIGHBOURS: [f64; 2] = [10.0, 26.0];
+/// Bytes that a neighbour takes in the lists.
+const NEIGHBOUR_BYTES: f64 = 8.0;
+/// The share of an atom's time that its neighbours take.
+const PAIR_SHARE: f64 = 0.3;
 /// Bytes that any run takes.
 const BASE_BYTES: f64 = 12e6;
 
@@ -78,14 +86,17 @@ impl Estimate {
     pub(super) fn new<const D: usize>(work: Work, atoms: f64, beside: Beside) -> Self {
         // Euler: 2 triangles a point. Random points have 6.77 tetrahedra each, lattices 5 to 6.
         let cells = atoms * if D == 2 { 2.0 } else { 6.0 };
-        let Beside { samples, copies, feature_points, tables } = beside;
+        let Beside { samples, copies, feature_points, tables, crowding } = beside;
+        let crowded = crowding - 1.0;
+        let lists = NEIGHBOUR_BYTES * NEIGHBOURS[D - 2] * crowded;
         let memory = BASE_BYTES
             + 4.0 * (samples * copies) as f64
             + FEATURE_POINT_BYTES * feature_points as f64
             + tables
-            + work.atom_bytes()[D - 2] * atoms;
+            + (work.atom_bytes()[D - 2] + lists) * atoms;
         let sampling = if tables > 0.0 { SAMPLED_SECONDS * samples as f64 } else { 0.0 };
-        let cpu_seconds = work.atom_seconds()[D - 2] * atoms + sampling;
+        let each = work.atom_seconds()[D - 2] * (1.0 + PAIR_SHARE * crowded);
+        let cpu_seconds = each * atoms + sampling;
         Self { atoms: atoms as u64, cells: cells as u64, memory: memory as u64, cpu_seconds }
     }
 }

@@ -166,6 +166,7 @@ impl<const D: usize> Prepared<D> {
             samples: grid.sample_count(),
             copies: 1 + copies.into_iter().filter(|&c| c).count(),
             feature_points: pieces.into_iter().flatten().map(Pieces::point_count).sum(),
+            crowding,
             tables: if is_sampled { energy::table_bytes(grid, self.distance()) } else { 0.0 },
         };
         let work = match options.kind {
