@@ -7,6 +7,7 @@ use crate::fields::NominalDistance;
 use crate::geometry::{Bins, Bounds, Point, difference, distance_squared, dot};
 
 use super::atoms::FeatureAtom;
+use super::segments::{Segment, Segments};
 use super::trace::{Curve, Cut, End, Tracer};
 
 /// A curve or a part of one shorter than this, over d, has no atoms of its own.
@@ -39,18 +40,21 @@ impl<const D: usize> Curves<D> {
     /// The curves of all pieces: in the plane the pieces themselves, in space where they meet sides and each other.
     pub fn of(pieces: &Pieces<D>, bounds: &Bounds<D>, distance: &NominalDistance<D>) -> Self {
         let mut curves = traced(pieces, bounds, distance);
-        join_ends(&mut curves, pieces, distance);
+        let step = pieces.step();
+        let segments = Segments::of(&curves, bounds, step);
+        join_ends(&mut curves, segments, distance, step);
         let stops = vec![Vec::new(); curves.len()];
-        let mut found = Self { stops, curves, nodes: Vec::new(), step: pieces.step() };
-        found.cross();
+        let mut found = Self { stops, curves, nodes: Vec::new(), step };
+        found.cross(bounds);
         found
     }
 
     /// Nodes where curves cross, and at all ends.
-    fn cross(&mut self) {
-        let crossings = crossings(&self.curves);
+    fn cross(&mut self, bounds: &Bounds<D>) {
+        let crossings = crossings(&self.curves, &Segments::of(&self.curves, bounds, self.step));
+        let mut bins = Bins::new(bounds, self.step, crossings.len() + 2 * self.curves.len());
         for (place, on) in crossings {
-            let node = self.node(place, on.iter().map(|&(curve, _)| curve));
+            let node = self.node(&mut bins, place, on.iter().map(|&(curve, _)| curve));
             for (curve, length) in on {
                 self.stops[curve].push((length, node));
             }
@@ -62,7 +66,7 @@ impl<const D: usize> Curves<D> {
             }
             let ends = [(0.0, places[0]), (length_of(places), places[places.len() - 1])];
             for (length, place) in ends {
-                let node = self.node(place, [curve].into_iter());
+                let node = self.node(&mut bins, place, [curve].into_iter());
                 self.stops[curve].push((length, node));
             }
         }
@@ -72,11 +76,22 @@ impl<const D: usize> Curves<D> {
         }
     }
 
-    /// A node at a place: one that is there already, or a new one.
-    fn node(&mut self, place: Point<D>, curves: impl Iterator<Item = usize>) -> u32 {
-        let near = (0.5 * self.step).powi(2);
-        let near = self.nodes.iter().position(|n| distance_squared(&n.place, &place) < near);
-        let at = near.unwrap_or_else(|| {
+    /// A node at a place: the first that is there already, or a new one. `bins` hold all of them.
+    fn node(
+        &mut self,
+        bins: &mut Bins<D>,
+        place: Point<D>,
+        curves: impl Iterator<Item = usize>,
+    ) -> u32 {
+        let reach = 0.5 * self.step;
+        let mut first = None;
+        bins.near(&place, reach, |i| {
+            if distance_squared(&self.nodes[i].place, &place) < reach * reach {
+                first = Some(first.map_or(i, |first: usize| first.min(i)));
+            }
+        });
+        let at = first.unwrap_or_else(|| {
+            bins.push(&place);
             self.nodes.push(Node { place, pieces: Vec::new() });
             self.nodes.len() - 1
         });
@@ -234,11 +249,12 @@ fn length_of<const D: usize>(places: &[Point<D>]) -> f64 {
     places.windows(2).map(|w| distance_squared(&w[0], &w[1]).sqrt()).sum()
 }
 
-/// Free ends that are near another curve are led onto it.
+/// Free ends that are near another curve are led onto it. `segments` are those of the curves.
 fn join_ends<const D: usize>(
     curves: &mut [Curve<D>],
-    pieces: &Pieces<D>,
+    mut segments: Segments<D>,
     distance: &NominalDistance<D>,
+    step: f64,
 ) {
     for curve in 0..curves.len() {
         for end in 0..2 {
@@ -247,15 +263,19 @@ fn join_ends<const D: usize>(
             }
             let places = &curves[curve].places;
             let place = if end == 0 { places[0] } else { places[places.len() - 1] };
-            let reach = JOIN * distance.at(&place) + 2.0 * pieces.step();
-            let Some(to) = nearest_on_others(curves, curve, &place, reach) else { continue };
+            let reach = JOIN * distance.at(&place) + 2.0 * step;
+            let Some(to) = nearest_on_others(curves, &segments, curve, &place, reach) else {
+                continue;
+            };
             // a little beyond, so that the two cross
             let over = std::array::from_fn(|k| to[k] + 1e-3 * (to[k] - place[k]));
-            if end == 0 {
-                curves[curve].places.insert(0, over);
-            } else {
-                curves[curve].places.push(over);
-            }
+            let places = &mut curves[curve].places;
+            let (index, ends) = match end {
+                0 => (0, [over, place]),
+                _ => (places.len() - 1, [place, over]),
+            };
+            places.insert(if end == 0 { 0 } else { places.len() }, over);
+            segments.push(Segment { curve, index, ends });
         }
     }
 }
@@ -263,24 +283,24 @@ fn join_ends<const D: usize>(
 /// The place on another curve of the same kind nearest to `p`.
 fn nearest_on_others<const D: usize>(
     curves: &[Curve<D>],
+    segments: &Segments<D>,
     own: usize,
     p: &Point<D>,
     reach: f64,
 ) -> Option<Point<D>> {
-    let mut best = (reach * reach, None);
-    for (other, curve) in curves.iter().enumerate() {
-        if other == own || curve.cut != curves[own].cut {
-            continue;
+    let mut best = (reach * reach, usize::MAX, None);
+    segments.near(p, reach, |number| {
+        let Segment { curve, ends: [a, b], .. } = &segments.all()[number];
+        if *curve == own || curves[*curve].cut != curves[own].cut {
+            return;
         }
-        for pair in curve.places.windows(2) {
-            let foot = foot_on_line(p, &pair[0], &pair[1]).1;
-            let squared = distance_squared(&foot, p);
-            if squared < best.0 {
-                best = (squared, Some(foot));
-            }
+        let foot = foot_on_line(p, a, b).1;
+        let squared = distance_squared(&foot, p);
+        if squared < best.0 || squared == best.0 && number < best.1 && best.2.is_some() {
+            best = (squared, number, Some(foot));
         }
-    }
-    best.1
+    });
+    best.2
 }
 
 /// The share along a line and the place on it that are nearest to `p`.
@@ -295,43 +315,43 @@ fn foot_on_line<const D: usize>(p: &Point<D>, a: &Point<D>, b: &Point<D>) -> (f6
 /// A crossing: where, and at which length of which curves.
 type Crossing<const D: usize> = (Point<D>, Vec<(usize, f64)>);
 
-/// Where lines of places cross, or, in space, pass within half a sample of each other.
-fn crossings<const D: usize>(curves: &[Curve<D>]) -> Vec<Crossing<D>> {
-    let mut found: Vec<Crossing<D>> = Vec::new();
-    let boxes: Vec<Option<Bounds<D>>> = curves.iter().map(|c| Bounds::of(&c.places)).collect();
-    let overlap = |a: &Bounds<D>, b: &Bounds<D>| {
-        (0..D).all(|k| a.min[k] <= b.max[k] + 1.0 && b.min[k] <= a.max[k] + 1.0)
+/// How far apart two lines may be along an axis that meet.
+const GAP: f64 = 0.5;
+
+/// Where lines of places cross, or, in space, pass within half a sample of each other: by the first curve, then the
+/// second, then along both.
+fn crossings<const D: usize>(curves: &[Curve<D>], segments: &Segments<D>) -> Vec<Crossing<D>> {
+    let all = segments.all();
+    let starts: Vec<Vec<f64>> = curves.iter().map(|curve| starts_of(&curve.places)).collect();
+    let length = |[a, b]: &[Point<D>; 2]| distance_squared(a, b).sqrt();
+    let of = |number: usize| {
+        let first = all[number];
+        let met = |other: usize| {
+            let second = all[other];
+            let [a, b] = &first.ends;
+            let [c, d] = &second.ends;
+            let (s, t, place) = meeting([a, b], [c, d])?;
+            let at_first = starts[first.curve][first.index] + s * length(&first.ends);
+            let at_second = starts[second.curve][second.index] + t * length(&second.ends);
+            let order = [first.curve, second.curve, first.index, second.index];
+            Some((order, (place, vec![(first.curve, at_first), (second.curve, at_second)])))
+        };
+        segments.later_near(number, GAP).into_iter().filter_map(met).collect::<Vec<_>>()
     };
-    for a in 0..curves.len() {
-        for b in a + 1..curves.len() {
-            let (Some(box_a), Some(box_b)) = (&boxes[a], &boxes[b]) else { continue };
-            if overlap(box_a, box_b) {
-                cross_two(curves, a, b, &mut found);
-            }
-        }
-    }
-    found
+    let found = (0..all.len()).into_par_iter().with_min_len(1 << 8).map(of);
+    let mut found: Vec<([usize; 4], Crossing<D>)> = found.flatten_iter().collect();
+    found.sort_by_key(|(order, _)| *order);
+    found.into_iter().map(|(_, crossing)| crossing).collect()
 }
 
-fn cross_two<const D: usize>(
-    curves: &[Curve<D>],
-    a: usize,
-    b: usize,
-    found: &mut Vec<Crossing<D>>,
-) {
-    let mut at_a = 0.0;
-    for pair in curves[a].places.windows(2) {
-        let length_a = distance_squared(&pair[0], &pair[1]).sqrt();
-        let mut at_b = 0.0;
-        for other in curves[b].places.windows(2) {
-            let length_b = distance_squared(&other[0], &other[1]).sqrt();
-            if let Some((s, t, place)) = meeting([&pair[0], &pair[1]], [&other[0], &other[1]]) {
-                found.push((place, vec![(a, at_a + s * length_a), (b, at_b + t * length_b)]));
-            }
-            at_b += length_b;
-        }
-        at_a += length_a;
-    }
+/// The length along a line of places up to each of them.
+fn starts_of<const D: usize>(places: &[Point<D>]) -> Vec<f64> {
+    let lengths = places.windows(2).map(|w| distance_squared(&w[0], &w[1]).sqrt());
+    let sums = lengths.scan(0.0, |sum, length| {
+        *sum += length;
+        Some(*sum)
+    });
+    std::iter::once(0.0).chain(sums).collect()
 }
 
 /// Where two short lines meet: the shares along them, and the place.
@@ -341,7 +361,7 @@ fn meeting<const D: usize>(
 ) -> Option<(f64, f64, Point<D>)> {
     let (u, v, w) = (difference(b, a), difference(d, c), difference(c, a));
     if (0..D)
-        .any(|k| a[k].max(b[k]) + 0.5 < c[k].min(d[k]) || c[k].max(d[k]) + 0.5 < a[k].min(b[k]))
+        .any(|k| a[k].max(b[k]) + GAP < c[k].min(d[k]) || c[k].max(d[k]) + GAP < a[k].min(b[k]))
     {
         return None;
     }

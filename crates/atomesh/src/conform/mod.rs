@@ -19,6 +19,7 @@ mod curves;
 mod cut;
 mod facets;
 mod recover;
+mod segments;
 mod trace;
 mod unmet;
 

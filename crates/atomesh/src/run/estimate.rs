@@ -37,7 +37,7 @@ impl Work {
         match self {
             Self::AsGrown => [390.0, 1400.0], // crystals have ties, which cost
             Self::Moved => [530.0, 950.0],
-            Self::Conforming => [700.0, 1300.0],
+            Self::Conforming => [530.0, 1250.0],
             Self::Divided => [900.0, 3100.0],
         }
     }
@@ -47,7 +47,7 @@ impl Work {
         match self {
             Self::AsGrown => [1.2e-5, 1.9e-5],
             Self::Moved => [6e-5, 2.6e-5],
-            Self::Conforming => [6e-5, 6.5e-5],
+            Self::Conforming => [4e-5, 6.5e-5],
             Self::Divided => [2e-5, 4e-5],
         }
     }

@@ -569,9 +569,9 @@ fn small_spacing_factors_are_forecast_and_said() {
             assert!(is_said, "{D} {spacing_factor}");
             let estimate = prepared.estimate().atoms as f64;
             let actual = prepared.fill(&mut Silent).unwrap().lattice().len() as f64;
-            // how crystals of all sizes meet differs from image to image
+            // how much of a box crystals of other sizes reach differs: what is forecast is where they reach all
             let share = estimate / actual;
-            assert!((0.7..1.4).contains(&share), "{D} {spacing_factor}: {estimate} for {actual}");
+            assert!((0.7..2.2).contains(&share), "{D} {spacing_factor}: {estimate} for {actual}");
         }
     }
     check(&Method::plane(), [64, 64], &[0.15, 0.3, 0.5]);
