@@ -102,7 +102,7 @@ pub fn read(
             AnyImage::Flat(image) => image.with_absent(absent).map(AnyImage::Flat),
             AnyImage::Volume(image) => image.with_absent(absent).map(AnyImage::Volume),
         };
-        loaded.image = image.map_err(|e| JobError::content(e).about(&path))?;
+        loaded.image = image.map_err(|e| JobError::content(e).about(path))?;
     }
     Ok(loaded)
 }

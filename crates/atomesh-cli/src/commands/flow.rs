@@ -2,9 +2,9 @@
 
 use std::fmt::Write;
 
-use atomesh_job::JobError;
 use atomesh_job::files::is_standard_output;
-use atomesh_job::flow::{FlowRequest, FlowSummary, flow_file};
+use atomesh_job::flow::{FlowExpectation, FlowRequest, FlowSummary, expect, flow_file};
+use atomesh_job::{JobError, memory};
 
 use super::standard_output::StandardOutput;
 use crate::progress::Progress;
@@ -27,6 +27,9 @@ pub struct FlowArgs {
     request: FlowRequest,
     #[command(flatten)]
     standard_output: StandardOutput,
+    /// Print how many cells and unknowns, and how much memory and time the answer would take; write nothing
+    #[arg(long, help_heading = "Run")]
+    dry_run: bool,
 }
 
 const USAGE: &str = "\
@@ -54,6 +57,11 @@ pub fn run(mut args: FlowArgs, progress: &mut Progress) -> Result<String, JobErr
     let output = &mut args.request.output;
     args.standard_output.format_any(&mut output.output)?;
     let holds_output = output.files().any(is_standard_output);
+    if args.dry_run {
+        let expected =
+            progress.job(|session| expect(args.request, session), |_, _| String::new())?;
+        return Ok(expectation(&expected));
+    }
     let found = progress.job(
         |session| flow_file(args.request, session),
         |FlowSummary { cell_count, scheme, unknowns, method, .. }, time| {
@@ -70,6 +78,15 @@ pub fn run(mut args: FlowArgs, progress: &mut Progress) -> Result<String, JobErr
         say(table.trim_end());
     }
     Ok(String::new())
+}
+
+fn expectation(expected: &FlowExpectation) -> String {
+    let FlowExpectation { cell_count, cells, unknowns, memory, seconds } = expected;
+    let memory = memory::text(*memory);
+    format!(
+        "cells    about {cell_count} {cells}\nunknowns about {unknowns}\nmemory   about {memory}\n\
+         time     about {seconds:.1} s\n"
+    )
 }
 
 /// The table of what flows in and out.

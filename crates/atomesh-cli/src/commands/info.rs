@@ -192,6 +192,9 @@ fn origin_text<const D: usize>(
         line(text, "image", format_args!("{} samples", list(&frame.shape())));
     }
     if let Some(provenance) = provenance {
+        if !provenance.units.is_empty() {
+            line(text, "units", provenance.units.join(","));
+        }
         line(text, "made by", format_args!("atomesh {}", provenance.version));
         line(text, "seed", provenance.seed);
         line(text, "options", &provenance.options);

@@ -63,8 +63,12 @@ fn write<const D: usize>(
     mesh: &Mesh<D>,
     tags: &Tags<D>,
 ) {
-    let provenance =
-        Provenance { version: "0.1.0".into(), options: serde_json::json!({}), seed: 7 };
+    let provenance = Provenance {
+        version: "0.1.0".into(),
+        options: serde_json::json!({}),
+        seed: 7,
+        units: Vec::new(),
+    };
     let (values, vectors) = (values(mesh), vec![[0.5; D]; mesh.cell_count()]);
     let data = MeshData::new(mesh).with_tags(tags).with_provenance(&provenance);
     let data = data.with_cell_field("v", &values).unwrap();

@@ -4,6 +4,7 @@
 //! from file to file.
 
 mod answer;
+mod expect;
 mod files;
 mod flow_mesh;
 mod leak;
@@ -14,6 +15,7 @@ mod problem;
 mod write;
 
 pub use answer::FlowAnswer;
+pub use expect::{FlowExpectation, expect};
 pub use flow_mesh::{FlowMesh, FlowMeshCells};
 pub use leak::Leak;
 pub use options::{FlowOptions, FlowOutputOptions};
@@ -214,35 +216,64 @@ pub struct FlowSummary {
 /// # Errors
 /// [`JobError`] as [`flow`], and if a file cannot be read or written.
 pub fn flow_file(request: FlowRequest, session: &mut Session<'_>) -> Result<FlowSummary, JobError> {
-    let (mut run, options, output) = request.into_parts()?;
-    let files = FlowFiles::new(&output)?;
-    files.check(&run.input, session)?;
-    if run.is_voronoi() {
-        options.check_for_voronoi()?;
-        files.check_for_voronoi()?;
-    }
-    run.take_labels_alone();
-    let path = shown(&run)?.to_path_buf();
-    let is_image = ImageFormat::of(&path).is_some() || run.frame.shape.is_some();
-    if !is_image && (mesh_file::is_list(&path) || MeshFormat::of(&path).is_ok()) {
-        refuse_mesh_options(&run)?;
-        let work = FileRun { run: &run, options: &options, files: &files };
-        return match flow_mesh::read(&path, session)? {
+    let Opened { run, options, files, source } = Opened::new(request, session)?;
+    let work = FileRun { run: &run, options: &options, files: &files };
+    match source {
+        Source::Mesh(mesh) => match *mesh {
             AnyFlowMesh::Flat(mesh) => work.solve(mesh, &Dimension::plane(), session),
             AnyFlowMesh::Volume(mesh) => work.solve(mesh, &Dimension::space(), session),
-        };
+        },
+        Source::Image(loaded) => {
+            let LoadedImage { image, units, .. } = *loaded;
+            match image {
+                AnyImage::Flat(image) => {
+                    work.mesh(ShownImage { image, units }, &Dimension::plane(), session)
+                }
+                AnyImage::Volume(image) => {
+                    work.mesh(ShownImage { image, units }, &Dimension::space(), session)
+                }
+            }
+        }
     }
-    let run = with_wells(run, &options);
-    run.check()?;
-    let work = FileRun { run: &run, options: &options, files: &files };
-    let LoadedImage { image, units, .. } = read_shown(&run, session)?;
-    match image {
-        AnyImage::Flat(image) => {
-            work.mesh(ShownImage { image, units }, &Dimension::plane(), session)
+}
+
+/// A request whose options and files fit each other, with what it is about read.
+struct Opened {
+    run: RunConfig,
+    options: FlowOptions,
+    files: FlowFiles,
+    source: Source,
+}
+
+/// What flow is computed on.
+enum Source {
+    /// A mesh as it is.
+    Mesh(Box<AnyFlowMesh>),
+    /// The mesh of an image.
+    Image(Box<LoadedImage>),
+}
+
+impl Opened {
+    fn new(request: FlowRequest, session: &mut Session<'_>) -> Result<Self, JobError> {
+        let (mut run, options, output) = request.into_parts()?;
+        let files = FlowFiles::new(&output)?;
+        files.check(&run.input, session)?;
+        if run.is_voronoi() {
+            options.check_for_voronoi()?;
+            files.check_for_voronoi()?;
         }
-        AnyImage::Volume(image) => {
-            work.mesh(ShownImage { image, units }, &Dimension::space(), session)
+        run.take_labels_alone();
+        let path = shown(&run)?.to_path_buf();
+        let is_image = ImageFormat::of(&path).is_some() || run.frame.shape.is_some();
+        if !is_image && (mesh_file::is_list(&path) || MeshFormat::of(&path).is_ok()) {
+            refuse_mesh_options(&run)?;
+            let source = Source::Mesh(Box::new(flow_mesh::read(&path, session)?));
+            return Ok(Self { run, options, files, source });
         }
+        let run = with_wells(run, &options);
+        run.check()?;
+        let source = Source::Image(Box::new(read_shown(&run, session)?));
+        Ok(Self { run, options, files, source })
     }
 }
 

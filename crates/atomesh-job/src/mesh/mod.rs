@@ -175,7 +175,12 @@ const SHARE_OF_THREAD: f64 = 0.7;
 /// How much more memory cells of second order take at an atom, in the plane and in space.
 const SECOND_ORDER_BYTES: [f64; 2] = [150.0, 450.0];
 
-fn expect_image<const D: usize>(
+/// The time that work of so many processor seconds takes.
+pub(crate) fn on_threads(cpu_seconds: f64) -> f64 {
+    cpu_seconds / (1.0 + SHARE_OF_THREAD * (rayon::current_num_threads() as f64 - 1.0))
+}
+
+pub(crate) fn expect_image<const D: usize>(
     run: &RunConfig,
     image: ShownImage<D>,
     dimension: &Dimension<D>,
@@ -193,8 +198,7 @@ fn expect_image<const D: usize>(
         true => (estimate.atoms, dimension.voronoi_cells),
         false => (estimate.cells, dimension.cells),
     };
-    let threads = rayon::current_num_threads() as f64;
-    let later = estimate.cpu_seconds / (1.0 + SHARE_OF_THREAD * (threads - 1.0));
+    let later = on_threads(estimate.cpu_seconds);
     // what is prepared has taken its time and memory already
     let seconds = (session.elapsed().as_secs_f64() + later).max(0.1);
     let second_order = match run.output.order {

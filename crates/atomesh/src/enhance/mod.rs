@@ -36,7 +36,7 @@ pub use options::{EdgeOperator, FeatureOptions, Features};
 pub use thin::{CrestOptions, FaultOptions, HorizonOptions, Polarity};
 
 use crate::crests::FeaturePoint;
-use crate::image::{Grid, Image, Samples, Units};
+use crate::image::{Grid, Image, Samples};
 use crate::watch::{Cancelled, Phase, Watch, check};
 use rayon::prelude::*;
 use scale::UnitSamples;
@@ -87,7 +87,7 @@ pub fn enhance<const D: usize>(
         return enhance(&image, &FeatureOptions { denoise: None, ..*options }, watch);
     }
     if let Some(continued) = image.continued() {
-        return Ok(enhance(&continued, options, watch)?.within(image, options.units));
+        return Ok(enhance(&continued, options, watch)?.within(image, options));
     }
     let unit = UnitSamples::new(image.samples())?;
     check(watch, Phase::Potential, 0.1, None)?;
@@ -100,14 +100,15 @@ pub fn enhance<const D: usize>(
 
 impl<const D: usize> Enhanced<D> {
     /// The same without what was found at samples where the image has no data.
-    fn within(mut self, image: &Image<D>, units: Units) -> Self {
+    fn within(mut self, image: &Image<D>, options: &FeatureOptions) -> Self {
         let Some(absent) = image.absent() else { return self };
         let all = self.values.par_iter_mut().zip(absent);
         all.filter(|(_, is_absent)| **is_absent).for_each(|(b, _)| *b = 0.0);
         if let Some(crests) = &mut self.crests {
-            keep_present(crests, &image.frame().grid(units), absent);
+            keep_present(crests, &image.frame().grid(options.units), absent);
         }
-        self.constant |= self.values.par_iter().all(|&b| b == 0.0);
+        let is_zero = self.values.par_iter().all(|&b| b == 0.0);
+        self.constant |= is_zero && options.features != Features::None;
         self
     }
 }

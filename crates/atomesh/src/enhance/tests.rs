@@ -290,4 +290,6 @@ fn features_end_where_data_do_and_stay_as_they_are_elsewhere() {
     }
     let points = feature_points(&part, &with(Features::Edges), &mut Silent).unwrap().unwrap();
     assert!(!points.is_empty() && points.iter().all(|p| p.position[1] > 11.0), "{points:?}");
+    // where none are asked for, none are missed
+    assert!(!run(&part, with(Features::None)).constant);
 }
