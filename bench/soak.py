@@ -323,7 +323,9 @@ def run(task):
                 wrong = judge_simplices(folder / output, box, masked, floor, np.array(scale), warned)
             outcome = "floor not held" if wrong is None and warned else outcome
             if wrong is None and seed % 10 == 0:
-                wrong = repeat(command, folder, output) or forecast(command, folder, peak)
+                # a child's peak begins with what its parent held when it was forked
+                own = resource.getrusage(resource.RUSAGE_SELF).ru_maxrss * 1024
+                wrong = repeat(command, folder, output) or forecast(command, folder, max(0, peak - own))
         return seed, outcome, wrong, text, peak, seconds
     except Exception as error:  # of the checker: a failure too
         return seed, "checker", repr(error), " ".join(map(str, given)) if "given" in locals() else "", 0, 0.0
@@ -405,16 +407,18 @@ def main():
     args = parser.parse_args()
     binary = str(Path(args.binary).resolve())
     tasks = ((binary, seed, args.keep) for seed in range(args.first, args.first + args.runs))
-    outcomes, failures, most = collections.Counter(), [], (0, 0.0)
+    outcomes, firsts, failures, most = collections.Counter(), {}, [], (0, 0)
     with multiprocessing.Pool(args.jobs) as pool:
         for seed, outcome, wrong, text, peak, seconds in pool.imap_unordered(run, tasks, chunksize=4):
-            outcomes[outcome if wrong is None else "FAILED"] += 1
+            outcome_said = outcome if wrong is None else "FAILED"
+            outcomes[outcome_said] += 1
+            firsts[outcome_said] = min(seed, firsts.get(outcome_said, seed))
             most = max(most, (peak, seed))
             if wrong is not None:
                 failures.append(seed)
                 print(f"{seed}: {outcome}: {wrong}\n    {text}", flush=True)
     for outcome, count in sorted(outcomes.items(), key=lambda pair: -pair[1]):
-        print(f"{count:7} {outcome}")
+        print(f"{count:7} {outcome} (as run {firsts[outcome]})")
     print(f"most memory {most[0] / 1e6:.0f} MB, run {most[1]}")
     sys.exit(bool(failures))
 

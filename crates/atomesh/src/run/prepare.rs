@@ -64,6 +64,8 @@ pub(super) fn prepare<const D: usize>(
         }
         match why_not(&options, &grid, &distance, is_masked) {
             Some(why) if asked == Align::Conform => warnings.push(Warning::NotConforming { why }),
+            // where there are none, none are turned onto
+            Some(_) if warnings.contains(&Warning::Constant) => {}
             Some(why) if has_features(&inputs, &options) && options.kind == MeshKind::Delaunay => {
                 warnings.push(Warning::TurnedOnly { why: why.into() });
             }
