@@ -284,7 +284,9 @@ fn halved<const D: usize>(method: &Method<D>, shape: [usize; D], radii: [f64; 2]
         let share = left.sum::<f64>() / outcome.mesh().measure();
         // cells have one label each: the cut is off by a part of a cell in places
         assert!((share - 0.5).abs() < 0.05, "{share}");
-        assert!(outcome.warnings().iter().all(Warning::is_note));
+        // narrow places within an outline may leave no room for the floor of angles
+        let odd = |w: &&Warning| !w.is_note() && !matches!(w, Warning::BelowFloor { .. });
+        assert_eq!(outcome.warnings().iter().find(odd), None);
     }
 }
 
