@@ -5,8 +5,8 @@ use std::path::Path;
 use atomesh::image::{Frame, Image, Samples};
 use atomesh::watch::Watch;
 use atomesh_io::image::{
-    AnyImage, ImageFormat, LoadedImage, Meaning, ReadError, ReadNote, ReadOptions, ReadReason,
-    SampleFormat, SeriesError, load_image, metres,
+    ImageFormat, LoadedImage, Meaning, ReadError, ReadNote, ReadOptions, ReadReason, SampleFormat,
+    SeriesError, load_image, metres,
 };
 use atomesh_io::mesh::Provenance;
 
@@ -95,14 +95,6 @@ pub fn read(
         if !session.notes().contains(&note) {
             session.note(note);
         }
-    }
-    if let Some(absent) = loaded.absent.take() {
-        let absent = absent.into_iter().map(|flag| flag != 0).collect();
-        let image = match loaded.image {
-            AnyImage::Flat(image) => image.with_absent(absent).map(AnyImage::Flat),
-            AnyImage::Volume(image) => image.with_absent(absent).map(AnyImage::Volume),
-        };
-        loaded.image = image.map_err(|e| JobError::content(e).about(path))?;
     }
     Ok(loaded)
 }

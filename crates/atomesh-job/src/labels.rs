@@ -57,6 +57,7 @@ pub(crate) fn whole(any: AnyImage) -> Result<(AnyImage, Vec<Oddity>), JobError> 
 }
 
 fn of_image<const D: usize>(image: Image<D>) -> Result<(Image<D>, Vec<Oddity>), JobError> {
+    let absent = image.absent().map(<[bool]>::to_vec);
     let (frame, mut samples) = image.into_parts();
     let most = match &mut samples {
         Samples::F32(values) => round(values, |v| f64::from(v.fract()), f32::round),
@@ -65,7 +66,10 @@ fn of_image<const D: usize>(image: Image<D>) -> Result<(Image<D>, Vec<Oddity>), 
     };
     let rounded = (most > 0.0).then_some(Oddity::Rounded { most });
     let many = are_many(&samples).then_some(Oddity::Many);
-    let image = Image::new(frame, samples).map_err(JobError::content)?;
+    let mut image = Image::new(frame, samples).map_err(JobError::content)?;
+    if let Some(absent) = absent {
+        image = image.with_absent(absent).map_err(JobError::content)?;
+    }
     Ok((image, rounded.into_iter().chain(many).collect()))
 }
 

@@ -60,7 +60,7 @@ pub fn unknowns_of<const D: usize>(cells: u64, order: usize) -> u64 {
     block * cells
 }
 
-/// An estimate of the memory that factors of so many equations in the plane take, in bytes: 6.7 ln n numbers for each.
+/// The estimated memory of a Cholesky factor of n equations in the plane, in bytes: 6.7 ln n numbers for each row.
 pub fn factor_memory(unknowns: u64) -> u64 {
     let n = unknowns.max(2) as f64;
     (8.0 * 6.7 * n * n.ln()) as u64

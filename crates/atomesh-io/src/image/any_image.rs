@@ -63,6 +63,11 @@ impl AnyImage {
         either!(self, i => i.samples())
     }
 
+    /// Whether each sample has no data; none if all have some.
+    pub fn absent(&self) -> Option<&[bool]> {
+        either!(self, i => i.absent())
+    }
+
     /// The name of the sample type, as NumPy spells it.
     pub fn type_name(&self) -> &'static str {
         self.samples().type_name()

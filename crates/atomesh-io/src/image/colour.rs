@@ -208,8 +208,8 @@ pub(super) fn palette_note(
     ReadNote::PaletteIndices { is_black_elsewhere }
 }
 
-/// The numbers of so many bits each in rows of whole bytes, the most significant first, as bytes; `bits` is 1, 2
-/// or 4.
+/// Unpacks values of `bits` bits each (1, 2 or 4) to bytes. Each row begins at a whole byte, the most significant bits
+/// first.
 pub(super) fn unpacked(rows: &[u8], width: usize, bits: usize) -> impl Iterator<Item = u8> {
     let mask = (1 << bits) - 1;
     let value = move |row: &[u8], x: usize| {

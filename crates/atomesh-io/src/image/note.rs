@@ -9,13 +9,10 @@ use super::traces::SampleFormat;
 /// An image, and what its file says or leaves open about it.
 #[derive(Clone, Debug)]
 pub struct LoadedImage {
-    /// The image.
+    /// The image; samples for which the file has no data (missing and dead traces) are 0 and absent.
     pub image: AnyImage,
     /// The units of the axes x, y (and z), such as `m` or `ms`; empty if the file names none.
     pub units: Vec<String>,
-    /// A byte for each sample, in the samples' order: 1 where the file has no data (missing and dead traces),
-    /// where the sample is 0; none if all samples have data.
-    pub absent: Option<Vec<u8>>,
     /// What the user should know, in the order in which it was found.
     pub notes: Vec<ReadNote>,
 }
@@ -30,7 +27,7 @@ impl LoadedImage {
 
 impl From<AnyImage> for LoadedImage {
     fn from(image: AnyImage) -> Self {
-        Self { image, units: Vec::new(), absent: None, notes: Vec::new() }
+        Self { image, units: Vec::new(), notes: Vec::new() }
     }
 }
 

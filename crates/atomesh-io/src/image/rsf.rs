@@ -228,7 +228,7 @@ impl Header {
             [x, y, z] => AnyImage::Volume(Image::new(frame([x, y, z])?, samples)?),
             _ => return Err(wrong("n", &axes.len().to_string(), "2 or 3 axes")),
         };
-        Ok(LoadedImage { image, units, absent: None, notes })
+        Ok(LoadedImage { image, units, notes })
     }
 }
 

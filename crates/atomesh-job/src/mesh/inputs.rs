@@ -1,6 +1,6 @@
 //! What a mesh is made from: images of one dimension and one shape, in memory.
 
-use std::path::{Path, PathBuf};
+use std::path::Path;
 
 use atomesh::image::{Between, Frame, Image, Samples as SampleValues};
 use atomesh::run::Inputs;
@@ -98,21 +98,17 @@ impl<const D: usize> MeshImages<D> {
         let image = images::place(image, &run.frame, shown, session)?;
         run.mesh_options::<D>()?;
         memory::check_potential(image.samples().len(), "mesh").map_err(|e| e.about_any(shown))?;
-        let mut field = |path: &Option<PathBuf>, kind: FieldKind| {
-            let read = |path| read_field(run, path, &of, kind, dimension, session);
-            path.as_deref().map(read).transpose()
+        let mut field = |path: Option<&Path>, kind: FieldKind| {
+            path.map(|path| read_field(run, path, &of, kind, dimension, session)).transpose()
         };
-        let size_field = field(&input.size_field, FieldKind::values(None))?;
-        let weight_field = field(&input.beta_field, FieldKind::values(None))?;
-        let mask = match input.masks_absent() {
-            true => None,
-            false => field(&input.mask, FieldKind::whole(Meaning::Mask))?,
-        };
-        let labels = field(&input.labels, FieldKind::whole(Meaning::Labels))?;
+        let size_field = field(input.size_field.as_deref(), FieldKind::values(None))?;
+        let weight_field = field(input.beta_field.as_deref(), FieldKind::values(None))?;
+        let mask = field(input.mask_file(), FieldKind::whole(Meaning::Mask))?;
+        let labels = field(input.labels.as_deref(), FieldKind::whole(Meaning::Labels))?;
         // without IMAGE, the potential is the image; outside of its file there are no features
         let no_feature = FieldKind::values(Some(0.0));
-        let potential =
-            if input.image.is_some() { field(&input.potential, no_feature)? } else { None };
+        let beside = input.potential.as_deref().filter(|_| input.image.is_some());
+        let potential = field(beside, no_feature)?;
         let is_potential = input.potential.is_some() && potential.is_none();
         let mask = match input.masks_absent() {
             true => live_mask(&image, shown, session),

@@ -24,8 +24,7 @@ pub(super) fn live_places(traces: &[Trace], survey: &Survey) -> Vec<usize> {
     traces.iter().zip(&survey.places).map(place).collect()
 }
 
-/// 1 for each of the samples without a trace, the planes of a volume one after another; none if every place
-/// has one.
+/// Whether each of the samples has no trace, the planes of a volume one after another; none if every place has one.
 ///
 /// # Errors
 /// [`ReadReason::Memory`] if a byte a sample does not fit.
@@ -34,13 +33,13 @@ pub(super) fn absent(
     plane: usize,
     depth: usize,
     memory: Memory,
-) -> Result<Option<Vec<u8>>, ReadReason> {
-    let mut is_absent = vec![1; plane];
-    places.iter().filter(|&&place| place != NOWHERE).for_each(|&place| is_absent[place] = 0);
-    if !is_absent.contains(&1) {
+) -> Result<Option<Vec<bool>>, ReadReason> {
+    let mut is_absent = vec![true; plane];
+    places.iter().filter(|&&place| place != NOWHERE).for_each(|&place| is_absent[place] = false);
+    if !is_absent.contains(&true) {
         return Ok(None);
     }
-    let mut absent: Vec<u8> = memory.zeros(plane.saturating_mul(depth))?;
+    let mut absent: Vec<bool> = memory.zeros(plane.saturating_mul(depth))?;
     absent.chunks_exact_mut(plane).for_each(|samples| samples.copy_from_slice(&is_absent));
     Ok(Some(absent))
 }

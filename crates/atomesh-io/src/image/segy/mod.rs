@@ -122,14 +122,27 @@ fn read(source: Source) -> Result<LoadedImage, ReadReason> {
     let (image, units) = if survey.is_cube {
         let frame = cube_frame([nx, ny, header.samples], placement, vertical)?;
         let samples = read_samples(&mut source, &header, &places, nx * ny, memory)?;
-        (AnyImage::Volume(Image::new(frame, samples)?), vec![length, length, depth])
+        (AnyImage::Volume(image_of(frame, samples, absent)?), vec![length, length, depth])
     } else {
         let frame = line_frame([nx, header.samples], placement, vertical)?;
         let samples = read_samples(&mut source, &header, &places, nx * ny, memory)?;
-        (AnyImage::Flat(Image::new(frame, samples)?), vec![length, depth])
+        (AnyImage::Flat(image_of(frame, samples, absent)?), vec![length, depth])
     };
     let units = units.into_iter().map(String::from).collect();
-    Ok(LoadedImage { image, units, absent, notes })
+    Ok(LoadedImage { image, units, notes })
+}
+
+/// The image of these samples, without data where `absent` says so.
+fn image_of<const D: usize>(
+    frame: Frame<D>,
+    samples: Samples,
+    absent: Option<Vec<bool>>,
+) -> Result<Image<D>, ReadReason> {
+    let image = Image::new(frame, samples)?;
+    Ok(match absent {
+        Some(absent) => image.with_absent(absent)?,
+        None => image,
+    })
 }
 
 /// Arranges the traces, and places their grid if they have coordinates.

@@ -44,12 +44,12 @@ fn warnings(loaded: &LoadedImage) -> Vec<String> {
 
 #[test]
 fn places_without_a_trace_are_told_from_samples_that_are_0() {
-    assert_eq!(cube(5, 7).plain().absent, None);
+    assert_eq!(cube(5, 7).plain().image.absent(), None);
     let mut some = cube(5, 7);
     some.traces.remove(17);
-    let absent = some.plain().absent.unwrap();
-    let expected: Vec<u8> = (0..5 * 35).map(|k| u8::from(k % 35 == 17)).collect();
-    assert_eq!(absent, expected);
+    let image = some.plain().image;
+    let expected: Vec<bool> = (0..5 * 35).map(|k| k % 35 == 17).collect();
+    assert_eq!(image.absent(), Some(&expected[..]));
 }
 
 #[test]
@@ -58,14 +58,14 @@ fn dead_traces_and_dummies_are_missing_ones() {
     for code in [2_i16, 3] {
         let loaded = Changed::of(&cube(5, 7)).with(29, code.to_be_bytes(), |k| k % 9 == 4).load();
         assert!(loaded.notes.contains(&ReadNote::DeadTraces { dead: 4, count: 35, first: 5 }));
-        let absent = loaded.absent.as_deref().unwrap_or_default();
+        let absent = loaded.image.absent().unwrap_or_default();
         for (k, value) in values(&loaded.image).into_iter().enumerate() {
             let is_dead = k % 35 % 9 == 4;
-            assert_eq!((value, absent[k] == 1), (if is_dead { 0.0 } else { whole[k] }, is_dead));
+            assert_eq!((value, absent[k]), (if is_dead { 0.0 } else { whole[k] }, is_dead));
         }
     }
     let marked = Changed::of(&cube(5, 7)).with(29, 2_i16.to_be_bytes(), |_| true).load();
-    assert_eq!((values(&marked.image), marked.absent), (whole, None));
+    assert_eq!((values(&marked.image), marked.image.absent()), (whole, None));
     assert!(marked.notes.contains(&ReadNote::AllDead { count: 35 }));
 }
 
@@ -200,9 +200,9 @@ fn coordinates_arrange_traces_that_have_no_numbers() {
     some.traces.drain(40..47);
     let some = some.plain();
     assert_eq!(some.image.shape(), [16, 12, 5]);
-    let absent = some.absent.unwrap();
+    let absent = some.image.absent().unwrap();
     for (k, value) in values(&some.image).into_iter().enumerate() {
-        assert_eq!(value, if absent[k] == 1 { 0.0 } else { values(&whole.image)[k] });
+        assert_eq!(value, if absent[k] { 0.0 } else { values(&whole.image)[k] });
     }
 }
 
