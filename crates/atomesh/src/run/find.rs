@@ -188,6 +188,20 @@ fn deepest_block<const D: usize>(potential: &ScalarField<D>) -> ([usize; D], [us
     (start, end)
 }
 
+/// How each kind of features is looked for; none where b is given.
+pub(super) fn kinds<const D: usize>(
+    inputs: &Inputs<'_, D>,
+    options: &MeshOptions<D>,
+) -> Vec<FeatureOptions> {
+    match &options.mixture {
+        _ if inputs.is_potential => Vec::new(),
+        Some(mixture) => (mixture.shares().iter())
+            .map(|share| FeatureOptions { features: share.features, ..options.features })
+            .collect(),
+        None => vec![options.features],
+    }
+}
+
 /// Points on the features, in lattice coordinates.
 fn feature_points<const D: usize>(
     inputs: &Inputs<'_, D>,
@@ -196,16 +210,9 @@ fn feature_points<const D: usize>(
     distance: &NominalDistance<D>,
     watch: &mut dyn Watch,
 ) -> Result<Vec<FeaturePoint<D>>, RunError> {
-    let kinds: Vec<FeatureOptions> = match &options.mixture {
-        _ if inputs.is_potential => Vec::new(),
-        Some(mixture) => (mixture.shares().iter())
-            .map(|share| FeatureOptions { features: share.features, ..options.features })
-            .collect(),
-        None => vec![options.features],
-    };
     let mut points = Vec::new();
     let mut is_valley = inputs.is_potential;
-    for kind in kinds {
+    for kind in kinds(inputs, options) {
         let kind = FeatureOptions { units: options.units, ..kind };
         match enhance::feature_points(image_of(inputs, kind.features), &kind, watch)? {
             Some(found) => points.extend(found),

@@ -12,7 +12,7 @@ use crate::watch::{Phase, Watch, check};
 
 use super::error::{RunError, Warning};
 use super::estimate::{crowding, feature_bytes};
-use super::find::{Found, Known, find_features};
+use super::find::{Found, Known, find_features, kinds};
 use super::inputs::Inputs;
 use super::method::Method;
 use super::options::{LatticeKind, MeshKind, MeshOptions, Size};
@@ -201,15 +201,8 @@ fn check_memory<const D: usize>(
     options: &MeshOptions<D>,
 ) -> Result<(), RunError> {
     let Some(available) = options.memory_limit else { return Ok(()) };
-    let kinds: Vec<Features> = match &options.mixture {
-        _ if inputs.is_potential => vec![Features::None],
-        Some(mixture) => mixture.shares().iter().map(|share| share.features).collect(),
-        None => vec![options.features.features],
-    };
-    let bytes = |features: &Features| {
-        feature_bytes(&FeatureOptions { features: *features, ..options.features }, kinds.len() > 1)
-    };
-    let most = kinds.iter().map(bytes).fold(0.0, f64::max);
+    let kinds = kinds(inputs, options);
+    let most = kinds.iter().map(|kind| feature_bytes(kind, kinds.len() > 1)).fold(0.0, f64::max);
     // b beside what makes it
     let needed = ((4.0 + most) * inputs.image.samples().len() as f64) as u64;
     if needed > available {
