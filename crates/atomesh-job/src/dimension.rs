@@ -9,6 +9,7 @@ use atomesh_io::image::AnyImage;
 
 /// How images of `D` axes are meshed, solved on and shown. What takes long to compile is compiled where it is
 /// written, once.
+#[derive(Clone)]
 pub struct Dimension<const D: usize> {
     /// How they are meshed.
     pub method: Method<D>,

@@ -86,8 +86,7 @@ pub fn read(
     if matches!(options.meaning, Meaning::Labels | Meaning::LabelsByColour) {
         let (image, odd) = labels::whole(loaded.image)?;
         loaded.image = image;
-        let kind = |odd: bool| if odd { NoteKind::Warning } else { NoteKind::Change };
-        said.extend(odd.into_iter().map(|odd| (kind(odd.is_warning()), odd.text())));
+        said.extend(odd.into_iter().map(|odd| (odd.kind(), odd.text())));
     }
     for (kind, text) in said {
         let note = Note { kind, file: Some(path.into()), text };

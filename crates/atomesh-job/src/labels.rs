@@ -6,6 +6,7 @@ use atomesh::image::{Image, Samples};
 use atomesh_io::image::AnyImage;
 
 use crate::error::JobError;
+use crate::session::NoteKind;
 
 /// How far a label may be from a whole number: files that keep integers by a slope in single precision come back some
 /// 1e-5 off; values farther off are other things than labels.
@@ -24,8 +25,8 @@ pub(crate) enum Oddity {
 }
 
 impl Oddity {
-    pub fn is_warning(self) -> bool {
-        self == Self::Many
+    pub fn kind(self) -> NoteKind {
+        if self == Self::Many { NoteKind::Warning } else { NoteKind::Change }
     }
 
     pub fn text(self) -> String {
@@ -56,7 +57,13 @@ pub(crate) fn whole(any: AnyImage) -> Result<(AnyImage, Vec<Oddity>), JobError> 
     })
 }
 
-fn of_image<const D: usize>(image: Image<D>) -> Result<(Image<D>, Vec<Oddity>), JobError> {
+/// The same for an image whose dimension is known.
+///
+/// # Errors
+/// None that input can cause.
+pub(crate) fn of_image<const D: usize>(
+    image: Image<D>,
+) -> Result<(Image<D>, Vec<Oddity>), JobError> {
     let absent = image.absent().map(<[bool]>::to_vec);
     let (frame, mut samples) = image.into_parts();
     let most = match &mut samples {

@@ -117,7 +117,7 @@ pub(crate) fn own_sides<const D: usize>(
 }
 
 /// The mesh with cells of positive orientation: those that another program wrote the other way are turned.
-pub(crate) fn oriented<const D: usize>(mesh: Mesh<D>) -> Mesh<D> {
+pub fn oriented<const D: usize>(mesh: Mesh<D>) -> Mesh<D> {
     let wrong: Vec<bool> = mesh.simplices().map(|simplex| simplex.orientation() < 0.0).collect();
     if !wrong.contains(&true) {
         return mesh;

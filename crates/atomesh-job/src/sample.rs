@@ -3,6 +3,7 @@
 mod sampled;
 
 pub use sampled::SampledMesh;
+pub(crate) use sampled::cell_fields;
 
 use std::path::PathBuf;
 use std::str::FromStr;
@@ -114,6 +115,11 @@ enum Numbers {
 }
 
 impl Property {
+    /// Values of which each fills one cell, in the precision in which they are given.
+    pub fn new(name: String, values: Vec<f64>) -> Self {
+        Self::exact(name, values)
+    }
+
     /// In single precision if nothing is lost.
     fn exact(name: String, values: Vec<f64>) -> Self {
         let kept = |v: &f64| v.is_nan() || f64::from(*v as f32) == *v;
@@ -130,6 +136,14 @@ impl Property {
 
     fn double(name: String, values: Vec<f64>) -> Self {
         Self { name, values: Numbers::Double(values) }
+    }
+
+    /// The values in double precision.
+    pub fn into_values(self) -> Vec<f64> {
+        match self.values {
+            Numbers::Single(values) => values.into_iter().map(f64::from).collect(),
+            Numbers::Double(values) => values,
+        }
     }
 
     /// The values, one for each cell.

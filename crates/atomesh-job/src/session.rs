@@ -178,7 +178,7 @@ impl<'w> Session<'w> {
     }
 
     /// Begins a phase that is not to be ended before its first file is whole.
-    pub(crate) fn begin(&mut self, phase: Phase) {
+    pub fn begin(&mut self, phase: Phase) {
         let _ = self.step(phase, 0.0, None);
     }
 

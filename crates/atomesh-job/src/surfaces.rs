@@ -1,6 +1,6 @@
 //! Groups of facets of a mesh file, and the closed surfaces of its regions, as surface files.
 
-use std::path::PathBuf;
+use std::path::{Path, PathBuf};
 
 use atomesh::mesh::{FacetGroup, Mesh, PolyMesh, Regions, Tags, feature_name, side_name};
 use atomesh::region::closed_surface;
@@ -180,7 +180,7 @@ pub fn surfaces_file(
 ///
 /// # Errors
 /// [`JobError`] if there is no such group, or the request names regions.
-fn surfaces_of_cells<const D: usize>(
+pub fn surfaces_of_cells<const D: usize>(
     request: &SurfacesRequest,
     loaded: &LoadedCells<D>,
 ) -> Result<Vec<FacetGroup<D>>, JobError> {
@@ -196,8 +196,8 @@ fn surfaces_of_cells<const D: usize>(
     without_repeats(&request.group).map(|name| group(&all, name)).collect()
 }
 
-/// The sides, numbered from 1, and after them the features.
-fn groups_of_cells<const D: usize>(loaded: &LoadedCells<D>) -> Vec<FacetGroup<D>> {
+/// The sides of Voronoi cells, numbered from 1, and after them the features; those that have faces.
+pub fn groups_of_cells<const D: usize>(loaded: &LoadedCells<D>) -> Vec<FacetGroup<D>> {
     let LoadedCells { mesh, features, .. } = loaded;
     let side = |side: usize| FacetGroup {
         id: side as u32 + 1,
@@ -226,7 +226,22 @@ fn write<const D: usize>(
     dimension: &Dimension<D>,
     session: &mut Session<'_>,
 ) -> Result<SurfacesSummary, JobError> {
-    let output = &request.output;
+    write_groups(&request.output, mesh, groups, dimension, session)?;
+    let facets = groups.iter().map(|group| group.facets.len()).sum();
+    Ok(SurfacesSummary { groups: groups.len(), facets })
+}
+
+/// Writes groups of facets as a file of surfaces.
+///
+/// # Errors
+/// [`JobError`] if the file's format is unknown or for another dimension, or it cannot be written.
+pub fn write_groups<const D: usize>(
+    output: &Path,
+    mesh: &Mesh<D>,
+    groups: &[FacetGroup<D>],
+    dimension: &Dimension<D>,
+    session: &mut Session<'_>,
+) -> Result<(), JobError> {
     let format = surface_format(output)?;
     format.check_dimension(D).map_err(|e| JobError::misuse(e).about(output))?;
     let write = dimension.files.surface;
@@ -234,9 +249,7 @@ fn write<const D: usize>(
         let path = files::stage(output, group)?;
         let written = write(&path, mesh, groups, None, session);
         written.map_err(|e| JobError::from(e).about(output))
-    })?;
-    let facets = groups.iter().map(|group| group.facets.len()).sum();
-    Ok(SurfacesSummary { groups: groups.len(), facets })
+    })
 }
 
 #[cfg(test)]

@@ -120,7 +120,8 @@ impl FeaturesRequest {
         self.image.as_deref().or(self.potential.as_deref())
     }
 
-    fn facet_options(&self) -> FeatureFacetOptions {
+    /// How facets are chosen.
+    pub fn facet_options(&self) -> FeatureFacetOptions {
         FeatureFacetOptions {
             below: self.below.unwrap_or(FeatureFacetOptions::default().below),
             test: self.test,

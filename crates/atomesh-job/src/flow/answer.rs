@@ -1,11 +1,20 @@
 //! What flows, and how it was found.
 
+use atomesh_draw::Picture;
 use atomesh_flow::dg::DgSolution;
+use atomesh_flow::streamlines::{Porosity, Streamline, TraceOptions};
 use atomesh_flow::{Balance, FlowGrid, FlowMethod, Problem, Setting, Solution};
 use serde_json::{Value, json};
 
-use super::flow_mesh::FlowMesh;
+use super::files::FlowFiles;
+use super::flow_mesh::{FlowMesh, FlowMeshCells};
 use super::leak::Leak;
+use super::options::FlowOutputOptions;
+use super::picture::FlowDrawing;
+use super::write::FlowWriting;
+use crate::dimension::Dimension;
+use crate::error::JobError;
+use crate::options::InputOptions;
 use crate::session::Session;
 
 /// What flows in a mesh, with all that it was computed from.
@@ -51,6 +60,54 @@ impl<const D: usize> FlowAnswer<D> {
     /// What flows in and out.
     pub fn balance(&self, method: &FlowMethod<D>) -> Balance {
         (method.balance)(&self.solution, &self.grid)
+    }
+
+    /// Writes the files that options name.
+    ///
+    /// # Errors
+    /// [`JobError`] if a name is of no use, a file cannot be written, or the watch ends the work.
+    pub fn write(
+        &self,
+        options: &FlowOutputOptions,
+        dimension: &Dimension<D>,
+        session: &mut Session<'_>,
+    ) -> Result<(), JobError> {
+        let files = FlowFiles::new(options)?;
+        if matches!(self.mesh.cells, FlowMeshCells::Voronoi { .. }) {
+            files.check_for_voronoi()?;
+        }
+        files.check(&InputOptions::default(), session)?;
+        FlowWriting::new(&files, self, dimension).write(session)
+    }
+
+    /// So many streamlines, shared among sources by their rates.
+    ///
+    /// # Errors
+    /// [`JobError`] if the watch ends the work.
+    pub fn streamlines(
+        &self,
+        count: usize,
+        method: &FlowMethod<D>,
+        session: &mut Session<'_>,
+    ) -> Result<Vec<Streamline<D>>, JobError> {
+        let porosity = Porosity::Constant(self.porosity);
+        let options = TraceOptions { count, porosity, ..TraceOptions::default() };
+        let setting = self.setting(method);
+        Ok((method.trace)(&self.grid, &setting, &self.solution, &options, session)?)
+    }
+
+    /// A picture of the flow over the image, or over the pressures; `lines` are drawn too.
+    ///
+    /// # Errors
+    /// [`JobError`] if it cannot be drawn.
+    pub fn picture(
+        &self,
+        shows_pressure: bool,
+        lines: &[Streamline<D>],
+        dimension: &Dimension<D>,
+    ) -> Result<Picture, JobError> {
+        let setting = &self.setting(&dimension.flow);
+        FlowDrawing { answer: self, setting, shows_pressure, lines }.picture(dimension)
     }
 
     /// Everything in numbers.

@@ -6,7 +6,7 @@ use atomesh::geometry::Point;
 use atomesh::image::Frame;
 use atomesh::watch::Phase;
 use atomesh_flow::Setting;
-use atomesh_flow::streamlines::{Porosity, Streamline, TraceOptions};
+use atomesh_flow::streamlines::{Porosity, Streamline};
 use atomesh_io::mesh::cells::CellData;
 use atomesh_io::mesh::{
     CellFields, FacetFlux, FluxFiles, FluxTable, MeshData, MeshDataError, MeshFormat, Provenance,
@@ -16,7 +16,6 @@ use atomesh_io::mesh::{
 use super::answer::FlowAnswer;
 use super::files::FlowFiles;
 use super::flow_mesh::FlowMeshCells;
-use super::picture::FlowDrawing;
 use crate::dimension::Dimension;
 use crate::error::JobError;
 use crate::files::{PictureFile, write_bytes};
@@ -74,14 +73,7 @@ impl<'a, const D: usize> FlowWriting<'a, D> {
     }
 
     fn lines(&self, session: &mut Session<'_>) -> Result<Vec<Streamline<D>>, JobError> {
-        let options = TraceOptions {
-            count: self.files.streamline_count,
-            porosity: Porosity::Constant(self.answer.porosity),
-            ..TraceOptions::default()
-        };
-        let FlowAnswer { grid, solution, .. } = self.answer;
-        let trace = self.dimension.flow.trace;
-        Ok(trace(grid, &self.setting, solution, &options, session)?)
+        self.answer.streamlines(self.files.streamline_count, &self.dimension.flow, session)
     }
 
     fn draw(
@@ -91,13 +83,8 @@ impl<'a, const D: usize> FlowWriting<'a, D> {
         session: &mut Session<'_>,
     ) -> Result<(), JobError> {
         session.begin(Phase::Draw);
-        let drawing = FlowDrawing {
-            answer: self.answer,
-            setting: &self.setting,
-            shows_pressure: self.files.shows_pressure,
-            lines: if self.files.shows_streamlines { lines } else { &[] },
-        };
-        file.write(&drawing.picture(self.dimension)?)
+        let lines = if self.files.shows_streamlines { lines } else { &[] };
+        file.write(&self.answer.picture(self.files.shows_pressure, lines, self.dimension)?)
     }
 
     /// Writes the mesh with what is known of its cells.

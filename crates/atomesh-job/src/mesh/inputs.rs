@@ -9,8 +9,9 @@ use atomesh_io::image::{LoadedImage, Meaning, ReadOptions};
 use crate::dimension::Dimension;
 use crate::error::JobError;
 use crate::images::{self, is_placed, scaled, unit_ratio};
+use crate::labels;
 use crate::memory;
-use crate::options::RunConfig;
+use crate::options::{FrameOptions, RunConfig};
 use crate::session::{Note, NoteKind, Session};
 
 /// The image that gives the frame, as read.
@@ -31,18 +32,44 @@ impl<const D: usize> From<Image<D>> for ShownImage<D> {
 /// What a field is: how it is read, and what lies between its samples.
 #[derive(Clone, Copy, Debug)]
 struct FieldKind {
+    /// What it is called where it is in memory.
+    name: &'static str,
     meaning: Meaning,
     between: Between,
 }
 
 impl FieldKind {
-    fn values(outside: Option<f64>) -> Self {
-        Self { meaning: Meaning::Brightness, between: Between::Linear { outside } }
+    fn values(name: &'static str, outside: Option<f64>) -> Self {
+        Self { name, meaning: Meaning::Brightness, between: Between::Linear { outside } }
     }
 
-    fn whole(meaning: Meaning) -> Self {
-        Self { meaning, between: Between::Nearest }
+    fn whole(name: &'static str, meaning: Meaning) -> Self {
+        Self { name, meaning, between: Between::Nearest }
     }
+}
+
+/// A field in memory, as a file would give it.
+#[derive(Clone, Debug)]
+pub struct GivenField<const D: usize> {
+    /// Its samples, placed by their own frame; a frame of unit steps at 0 says nothing of where they are.
+    pub image: Image<D>,
+    /// The units of its world's axes; empty if they are those of the image that is meshed.
+    pub units: Vec<String>,
+}
+
+/// Fields in memory; each goes before the file that options name.
+#[derive(Clone, Debug, Default)]
+pub struct GivenFields<const D: usize> {
+    /// b(x), values −1…1, in place of the image's features.
+    pub potential: Option<GivenField<D>>,
+    /// d(x), in lattice units.
+    pub size_field: Option<GivenField<D>>,
+    /// β(x), 0…1.
+    pub weight_field: Option<GivenField<D>>,
+    /// Where to mesh: nonzero is inside, or, of shares within 0…1, at least one half.
+    pub mask: Option<GivenField<D>>,
+    /// A label for each sample.
+    pub labels: Option<GivenField<D>>,
 }
 
 /// The images that a mesh is made from, in place: in their frame, cropped, without NaN.
@@ -91,6 +118,20 @@ impl<const D: usize> MeshImages<D> {
         dimension: &Dimension<D>,
         session: &mut Session<'_>,
     ) -> Result<Self, JobError> {
+        Self::with_fields(run, image, GivenFields::default(), dimension, session)
+    }
+
+    /// The same with fields in memory besides.
+    ///
+    /// # Errors
+    /// As [`MeshImages::read_fields`].
+    pub fn with_fields(
+        run: &RunConfig,
+        image: impl Into<ShownImage<D>>,
+        given: GivenFields<D>,
+        dimension: &Dimension<D>,
+        session: &mut Session<'_>,
+    ) -> Result<Self, JobError> {
         let ShownImage { image, units } = image.into();
         let input = &run.input;
         let shown = input.shown();
@@ -98,17 +139,27 @@ impl<const D: usize> MeshImages<D> {
         let image = images::place(image, &run.frame, shown, session)?;
         run.mesh_options::<D>()?;
         memory::check_potential(image.samples().len(), "mesh").map_err(|e| e.about_any(shown))?;
-        let mut field = |path: Option<&Path>, kind: FieldKind| {
-            path.map(|path| read_field(run, path, &of, kind, dimension, session)).transpose()
+        let mut field = |given: Option<GivenField<D>>, path: Option<&Path>, kind: FieldKind| {
+            let source = match (given, path) {
+                (Some(given), _) => FieldSource::of(given, &kind, session)?,
+                (None, Some(path)) => FieldSource::read(run, path, &kind, dimension, session)?,
+                (None, None) => return Ok(None),
+            };
+            source.in_place(run, &of, kind.between, session).map(Some)
         };
-        let size_field = field(input.size_field.as_deref(), FieldKind::values(None))?;
-        let weight_field = field(input.beta_field.as_deref(), FieldKind::values(None))?;
-        let mask = field(input.mask_file(), FieldKind::whole(Meaning::Mask))?;
-        let labels = field(input.labels.as_deref(), FieldKind::whole(Meaning::Labels))?;
+        let size = FieldKind::values("size_field", None);
+        let size_field = field(given.size_field, input.size_field.as_deref(), size)?;
+        let weight = FieldKind::values("beta_field", None);
+        let weight_field = field(given.weight_field, input.beta_field.as_deref(), weight)?;
+        let mask = FieldKind::whole("mask", Meaning::Mask);
+        let mask = field(given.mask, input.mask_file(), mask)?;
+        let labels = FieldKind::whole("labels", Meaning::Labels);
+        let labels = field(given.labels, input.labels.as_deref(), labels)?;
         // without IMAGE, the potential is the image; outside of its file there are no features
-        let no_feature = FieldKind::values(Some(0.0));
-        let beside = input.potential.as_deref().filter(|_| input.image.is_some());
-        let potential = field(beside, no_feature)?;
+        let no_feature = FieldKind::values("potential", Some(0.0));
+        let is_beside = input.image.is_some() || given.potential.is_some();
+        let beside = input.potential.as_deref().filter(|_| is_beside);
+        let potential = field(given.potential, beside, no_feature)?;
         let is_potential = input.potential.is_some() && potential.is_none();
         let mask = match input.masks_absent() {
             true => live_mask(&image, shown, session),
@@ -116,6 +167,35 @@ impl<const D: usize> MeshImages<D> {
         };
         let Samples { units, .. } = of;
         Ok(Self { image, is_potential, potential, size_field, weight_field, mask, labels, units })
+    }
+
+    /// Takes fields in memory in place of those that there are; the image is in place already.
+    ///
+    /// # Errors
+    /// [`JobError`] if one does not lie over the image.
+    pub fn take_given(
+        &mut self,
+        run: &RunConfig,
+        given: GivenFields<D>,
+        session: &mut Session<'_>,
+    ) -> Result<(), JobError> {
+        let none = RunConfig { frame: FrameOptions::default(), ..run.clone() };
+        let of = Samples::of(&self.image, self.units.clone(), &none)?;
+        let mut field = |given: Option<GivenField<D>>, kind: FieldKind| {
+            let source = given.map(|given| FieldSource::of(given, &kind, session)).transpose()?;
+            source.map(|s| s.in_place(&none, &of, kind.between, session)).transpose()
+        };
+        let potential = field(given.potential, FieldKind::values("potential", Some(0.0)))?;
+        let size_field = field(given.size_field, FieldKind::values("size_field", None))?;
+        let weight_field = field(given.weight_field, FieldKind::values("beta_field", None))?;
+        let mask = field(given.mask, FieldKind::whole("mask", Meaning::Mask))?;
+        let labels = field(given.labels, FieldKind::whole("labels", Meaning::Labels))?;
+        self.potential = potential.or(self.potential.take());
+        self.size_field = size_field.or(self.size_field.take());
+        self.weight_field = weight_field.or(self.weight_field.take());
+        self.mask = mask.or(self.mask.take());
+        self.labels = labels.or(self.labels.take());
+        Ok(())
     }
 
     /// b(x) in the image's frame, if it is given beside the image.
@@ -193,8 +273,11 @@ impl<const D: usize> Samples<D> {
     fn of(image: &Image<D>, units: Vec<String>, run: &RunConfig) -> Result<Self, JobError> {
         let own = *image.frame();
         let placed = run.frame.apply(own)?;
-        let is_placed =
-            placed != own || run.input.shown().is_some_and(|path| is_placed(path, &own));
+        let says_where = match run.input.shown() {
+            Some(path) => is_placed(path, &own),
+            None => !is_bare(&own),
+        };
+        let is_placed = placed != own || says_where;
         Ok(Self { own, placed, is_placed, units })
     }
 }
@@ -215,47 +298,96 @@ fn live_mask<const D: usize>(
     Some(mask.expect("the image has a flag for each sample"))
 }
 
-/// Reads an image that belongs to the samples of the first: it is placed by its own frame where there is one, else by its
-/// shape. Its box of interest is taken.
-fn read_field<const D: usize>(
-    run: &RunConfig,
-    path: &Path,
-    of: &Samples<D>,
-    FieldKind { meaning, between }: FieldKind,
-    dimension: &Dimension<D>,
-    session: &mut Session<'_>,
-) -> Result<Image<D>, JobError> {
-    let options = ReadOptions { raw: None, ..run.frame.read_options_for(meaning)? };
-    let LoadedImage { image: any, units, .. } = images::read(path, &options, session)?;
-    let found = any.dimension();
-    let Some(mut field) = (dimension.image)(any) else {
-        let message = format!("has {found} axes; expected {D}, as {}", name(run));
-        return Err(JobError::content(message).about(path));
-    };
-    let mut say = |is_warning: bool, text: String| {
-        let kind = if is_warning { NoteKind::Warning } else { NoteKind::Change };
-        session.note(Note { kind, file: Some(path.into()), text });
-    };
-    let own = *field.frame();
-    if let Some((ratio, text)) = unit_ratio(&units, &of.units).filter(|_| is_placed(path, &own)) {
-        field = field.with_frame(scaled(&own, ratio)?).map_err(JobError::content)?;
-        say(false, text);
+/// A field, and what is known of where it comes from.
+struct FieldSource<'a, const D: usize> {
+    /// Its file, or its name where it is in memory.
+    file: &'a Path,
+    image: Image<D>,
+    units: Vec<String>,
+    /// Whether it says where its samples are.
+    is_placed: bool,
+}
+
+impl<'a, const D: usize> FieldSource<'a, D> {
+    /// A field in memory.
+    fn of(
+        given: GivenField<D>,
+        kind: &FieldKind,
+        session: &mut Session<'_>,
+    ) -> Result<Self, JobError> {
+        let GivenField { mut image, units } = given;
+        let file = Path::new(kind.name);
+        if kind.meaning == Meaning::Labels {
+            let (whole, odd) = labels::of_image(image)?;
+            image = whole;
+            for odd in odd {
+                let (kind, text) = (odd.kind(), odd.text());
+                session.note(Note { kind, file: Some(file.into()), text });
+            }
+        }
+        let is_placed = !is_bare(image.frame());
+        Ok(Self { file, image, units, is_placed })
     }
-    let field = onto(field, run, path, of, between, &mut say).map_err(|e| e.about(path))?;
-    run.frame.place(field).map_err(|e| e.about(path))
+
+    /// Reads an image that belongs to the samples of the first.
+    fn read(
+        run: &RunConfig,
+        path: &'a Path,
+        kind: &FieldKind,
+        dimension: &Dimension<D>,
+        session: &mut Session<'_>,
+    ) -> Result<Self, JobError> {
+        let options = ReadOptions { raw: None, ..run.frame.read_options_for(kind.meaning)? };
+        let LoadedImage { image: any, units, .. } = images::read(path, &options, session)?;
+        let found = any.dimension();
+        let Some(image) = (dimension.image)(any) else {
+            let message = format!("has {found} axes; expected {D}, as {}", name(run));
+            return Err(JobError::content(message).about(path));
+        };
+        let is_placed = is_placed(path, image.frame());
+        Ok(Self { file: path, image, units, is_placed })
+    }
+
+    /// The field at the samples of the first image, by its own frame where it has one, else by its shape. The box of
+    /// interest is taken.
+    fn in_place(
+        self,
+        run: &RunConfig,
+        of: &Samples<D>,
+        between: Between,
+        session: &mut Session<'_>,
+    ) -> Result<Image<D>, JobError> {
+        let Self { file, image: mut field, units, is_placed } = self;
+        let mut say = |is_warning: bool, text: String| {
+            let kind = if is_warning { NoteKind::Warning } else { NoteKind::Change };
+            session.note(Note { kind, file: Some(file.into()), text });
+        };
+        if let Some((ratio, text)) = unit_ratio(&units, &of.units).filter(|_| is_placed) {
+            let scaled = scaled(field.frame(), ratio)?;
+            field = field.with_frame(scaled).map_err(JobError::content)?;
+            say(false, text);
+        }
+        let field = onto(field, is_placed, run, of, between, &mut say);
+        let field = field.map_err(|e| e.about(file))?;
+        run.frame.place(field).map_err(|e| e.about(file))
+    }
+}
+
+/// Whether a frame is that of samples of which nothing is known but their number: unit steps, the first at 0.
+fn is_bare<const D: usize>(frame: &Frame<D>) -> bool {
+    Frame::new(frame.shape()).as_ref() == Ok(frame)
 }
 
 /// The field at the samples of the image.
 fn onto<const D: usize>(
     field: Image<D>,
+    is_placed: bool,
     run: &RunConfig,
-    path: &Path,
     of: &Samples<D>,
     between: Between,
     say: &mut dyn FnMut(bool, String),
 ) -> Result<Image<D>, JobError> {
     let (own, image) = (*field.frame(), name(run));
-    let is_placed = is_placed(path, &own);
     if !(is_placed && of.is_placed) {
         let (found, expected) = (own.shape(), of.own.shape());
         if found != expected {

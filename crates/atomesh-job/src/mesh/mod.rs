@@ -7,15 +7,17 @@
 mod figures;
 mod format;
 mod inputs;
+mod made;
 mod outputs;
 mod refusal;
 mod write;
 
 pub use figures::{Figures, Measured};
 pub(crate) use inputs::shown;
-pub use inputs::{MeshImages, ShownImage, read_shown};
+pub use inputs::{GivenField, GivenFields, MeshImages, ShownImage, read_shown};
+pub use made::MadeMesh;
 pub(crate) use outputs::staged_list;
-pub(crate) use refusal::refusal;
+pub use refusal::refusal;
 pub use write::Tagged;
 
 use std::path::{Path, PathBuf};
@@ -27,13 +29,10 @@ use atomesh_io::image::{AnyImage, LoadedImage};
 
 use crate::dimension::Dimension;
 use crate::error::JobError;
-use crate::files::write_bytes;
 use crate::memory;
 use crate::options::RunConfig;
 use crate::session::Session;
-use figures::RunPage;
 use outputs::Outputs;
-use write::Writing;
 
 /// Makes b(x), d(x) and β(x), and gives the image back. Memory is limited to what is available.
 ///
@@ -74,7 +73,10 @@ pub fn mesh<const D: usize>(
 }
 
 /// Meshes what is prepared, and says what of it is odd.
-pub(crate) fn meshed<const D: usize>(
+///
+/// # Errors
+/// [`JobError`] if memory does not suffice, the image is of no use, or the watch ends the work.
+pub fn meshed<const D: usize>(
     run: &RunConfig,
     prepared: Prepared<D>,
     session: &mut Session<'_>,
@@ -230,45 +232,8 @@ impl FileRun<'_> {
         let (prepared, image) = prepare(run, images, dimension, session)?;
         let image = outputs.needs_image().then_some(image);
         let outcome = meshed(run, prepared, session)?;
-        let measured = match &image {
-            Some(image) if outputs.needs_report() => Measured::All(image),
-            _ if self.options.measures_shape => Measured::Shape,
-            _ => Measured::Nothing,
-        };
-        let figures = Figures::new(run, &outcome, measured, dimension.tools, session)?;
-        let tagged = session.write_together(|group, session| {
-            let outputs = &outputs.staged(group)?;
-            let writing = Writing { run, outputs, outcome: &outcome, units: &units, dimension };
-            let tagged = writing.write(image.as_ref(), session)?;
-            self.write_about(&writing, image.as_ref(), &figures, session)?;
-            Ok(tagged)
-        })?;
-        let cells = if run.is_voronoi() { dimension.voronoi_cells } else { dimension.cells };
-        let (mesh, improved) = (outputs.mesh.clone(), outcome.improve_report().cloned());
-        Ok(MeshSummary { mesh, cells, figures, improved, tagged })
-    }
-
-    /// Writes the options and reports.
-    fn write_about<const D: usize>(
-        &self,
-        writing: &Writing<'_, D>,
-        image: Option<&Image<D>>,
-        figures: &Figures,
-        session: &mut Session<'_>,
-    ) -> Result<(), JobError> {
-        let Writing { run, outputs, outcome, dimension, .. } = *writing;
-        if let Some(path) = &outputs.config {
-            write_bytes(path, run.clone().with_defaults::<D>().to_toml()?.as_bytes())?;
-        }
-        session.end_phase();
-        if let Some(path) = &outputs.report {
-            let text = format!("{:#}\n", figures.json(run, outcome, session));
-            write_bytes(path, text.as_bytes())?;
-        }
-        if let (Some(path), Some(image), Some(report)) = (&outputs.html, image, &figures.report) {
-            let page = RunPage { run, outcome, image, report, style: writing.style() };
-            page.write(path, &outputs.mesh, dimension, session)?;
-        }
-        Ok(())
+        let image = image.as_ref();
+        let made = MadeMesh { run, outcome: &outcome, image, units: &units, properties: &[] };
+        made.write_outputs(outputs, self.options.measures_shape, dimension, session)
     }
 }

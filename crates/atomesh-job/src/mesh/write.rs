@@ -18,6 +18,7 @@ use crate::dimension::Dimension;
 use crate::error::JobError;
 use crate::images::is_z_up;
 use crate::options::{Backdrop, RunConfig};
+use crate::sample::{Property, cell_fields};
 use crate::session::Session;
 
 /// Facets that were tagged as features.
@@ -36,6 +37,8 @@ pub(super) struct Writing<'a, const D: usize> {
     pub outcome: &'a Outcome<D>,
     /// The units of the world's axes, if they are known.
     pub units: &'a [String],
+    /// Properties of the cells.
+    pub properties: &'a [Property],
     pub dimension: &'a Dimension<D>,
 }
 
@@ -128,6 +131,9 @@ impl<const D: usize> Writing<'_, D> {
         if let Some(labels) = &labels {
             data = data.with_cell_field("label", labels).map_err(JobError::content)?;
         }
+        for field in self.properties {
+            data = data.with_cell_field(&field.name, field.values()).map_err(JobError::content)?;
+        }
         let written = (self.dimension.files.mesh)(&self.outputs.mesh, format, &data, session);
         written.map_err(|e| JobError::from(e).about(&self.outputs.mesh))?;
         Ok(tagged)
@@ -178,8 +184,19 @@ impl<const D: usize> Writing<'_, D> {
         let frame = self.outcome.frame();
         let data = CellData { mesh: &mesh, features: &features, frame, provenance };
         let files = &self.dimension.files;
-        let write = if is_foam { files.foam_cells } else { files.cells };
-        write(path, &data, session).map_err(|e| JobError::from(e).about(path))?;
+        let written = match self.properties {
+            [] if is_foam => (files.foam_cells)(path, &data, session),
+            [] => (files.cells)(path, &data, session),
+            _ if is_foam => {
+                let message = "polyMesh holds no values of cells; expected .vtu";
+                return Err(JobError::misuse(message).about(path));
+            }
+            fields => {
+                let fields = cell_fields(cells.cell_count(), fields).map_err(JobError::content)?;
+                (files.cells_with)(path, &data, &fields, session)
+            }
+        };
+        written.map_err(|e| JobError::from(e).about(path))?;
         if let Some(tables) = &outputs.connections {
             let written = (files.connections)(tables, &data, session);
             written.map_err(|e| JobError::from(e).about(&tables.head))?;

@@ -67,6 +67,14 @@ section! {
 }
 
 impl LatticeOptions {
+    /// The one length that --size asks for.
+    pub fn wanted_length(&self) -> Option<f64> {
+        match self.size?.0 {
+            Size::Constant(length) => Some(length),
+            _ => None,
+        }
+    }
+
     /// What --size or --frequency ask for.
     pub(super) fn wanted_size(&self) -> Result<Size, JobError> {
         let points = self.points_per_wavelength;

@@ -74,6 +74,18 @@ impl RunConfig {
         self.lattice.mesh == Some(MeshKind::Voronoi)
     }
 
+    /// The sections of a configuration, each with its options' names as the structs have them.
+    pub const SECTIONS: &[(&str, &[&str])] = &[
+        ("input", InputOptions::NAMES),
+        ("output", OutputOptions::NAMES),
+        ("lattice", LatticeOptions::NAMES),
+        ("features", PotentialOptions::NAMES),
+        ("regions", RegionOptions::NAMES),
+        ("frame", FrameOptions::NAMES),
+        ("optimize", OptimizerOptions::NAMES),
+        ("improve", ImprovementOptions::NAMES),
+    ];
+
     /// Reads a configuration.
     ///
     /// # Errors

@@ -28,6 +28,9 @@ macro_rules! section {
         }
 
         impl $name {
+            /// The options' names, as fields of this struct.
+            pub const NAMES: &[&str] = &[$(stringify!($field)),*];
+
             /// Takes from `other` what was not given.
             pub fn or(self, other: Self) -> Self {
                 Self { $($field: self.$field.or(other.$field),)* }

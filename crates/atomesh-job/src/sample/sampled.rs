@@ -7,7 +7,9 @@ use atomesh::run::Tools;
 use atomesh::sample::{CellProperties, SampleError, SampleOptions};
 use atomesh::watch::Watch;
 use atomesh_io::mesh::cells::{CellData, LoadedCells};
-use atomesh_io::mesh::{CellFields, LoadedMesh, MeshData, MeshFormat, OwnedField, Provenance};
+use atomesh_io::mesh::{
+    CellFields, LoadedMesh, MeshData, MeshDataError, MeshFormat, OwnedField, Provenance,
+};
 
 use super::Property;
 use crate::dimension::Dimension;
@@ -160,11 +162,22 @@ impl<const D: usize> SampledMesh<D> for LoadedCells<D> {
     ) -> Result<(), JobError> {
         let Self { mesh, features, frame, provenance, .. } = self;
         let data = CellData { mesh, features, frame, provenance };
-        let mut fields = CellFields::new(mesh.cell_count());
-        for field in properties {
-            fields = fields.with_numbers(&field.name, field.values()).map_err(JobError::content)?;
-        }
+        let fields = cell_fields(mesh.cell_count(), properties).map_err(JobError::content)?;
         let written = (dimension.files.cells_with)(path, &data, &fields, session);
         written.map_err(|e| JobError::from(e).about(path))
     }
+}
+
+/// Properties of so many cells, to be written with them.
+///
+/// # Errors
+/// [`MeshDataError`] if values are not one a cell, or a name does not fit the format.
+pub(crate) fn cell_fields<const D: usize>(
+    cell_count: usize,
+    properties: &[Property],
+) -> Result<CellFields<'_, D>, MeshDataError> {
+    let none = CellFields::new(cell_count);
+    properties
+        .iter()
+        .try_fold(none, |fields, field| fields.with_numbers(&field.name, field.values()))
 }

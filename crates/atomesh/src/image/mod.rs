@@ -74,7 +74,7 @@ impl<const D: usize> Image<D> {
     ///
     /// # Panics
     /// If there are not as many.
-    pub(crate) fn with_samples(self, samples: Samples) -> Self {
+    pub fn with_samples(self, samples: Samples) -> Self {
         assert_eq!(samples.len(), self.frame.sample_count());
         Self { samples, ..self }
     }

@@ -53,7 +53,7 @@ pub(super) struct Stages<const D: usize> {
     pub sample_mesh: fn(&Outcome<D>) -> Mesh<D>,
     pub world_cells: fn(&Outcome<D>) -> Option<PolyMesh<D>>,
     pub sample_cells: fn(&Outcome<D>) -> Option<PolyMesh<D>>,
-    pub distance_at_samples: fn(&Outcome<D>) -> Vec<f32>,
+    pub distance_at_samples: fn(&Prepared<D>) -> Vec<f32>,
     pub cell_features: fn(&Outcome<D>, f64) -> Option<FeatureFaces>,
     pub across_features: fn(&Outcome<D>, &mut dyn Watch) -> Made<Vec<AcrossFeature<D>>>,
     pub feature_density: fn(&Outcome<D>) -> Vec<f32>,

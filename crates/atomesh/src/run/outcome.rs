@@ -144,7 +144,7 @@ impl<const D: usize> Outcome<D> {
 
     /// d at the image's samples, x fastest.
     pub fn distance_at_samples(&self) -> Vec<f32> {
-        (self.stages().distance_at_samples)(self)
+        self.run.distance_at_samples()
     }
 
     /// How many features there are around each of the image's samples, x fastest: |b| smoothed by the greatest
@@ -319,9 +319,9 @@ pub(super) fn sample_cells_of<const D: usize>(outcome: &Outcome<D>) -> Option<Po
     outcome.cells.as_ref().map(|cells| cells.moved(false, to))
 }
 
-/// [`Outcome::distance_at_samples`].
-pub(super) fn distance_at_samples_of<const D: usize>(outcome: &Outcome<D>) -> Vec<f32> {
-    let grid = outcome.potential().grid();
+/// [`Prepared::distance_at_samples`].
+pub(super) fn distance_at_samples_of<const D: usize>(run: &Prepared<D>) -> Vec<f32> {
+    let grid = run.potential().grid();
     let row = grid.shape[0];
     let mut values = vec![0.0; grid.sample_count()];
     values.par_chunks_mut(row).enumerate().for_each(|(r, values)| {
@@ -333,7 +333,7 @@ pub(super) fn distance_at_samples_of<const D: usize>(outcome: &Outcome<D>) -> Ve
         }
         for (i, value) in values.iter_mut().enumerate() {
             p[0] = i as f64 * grid.step[0];
-            *value = outcome.distance().at(&p) as f32;
+            *value = run.distance().at(&p) as f32;
         }
     });
     values

@@ -100,6 +100,11 @@ impl<const D: usize> Prepared<D> {
         self.0.fields.distance()
     }
 
+    /// d at the image's samples, x fastest, in lattice units.
+    pub fn distance_at_samples(&self) -> Vec<f32> {
+        (self.0.method.stages().distance_at_samples)(self)
+    }
+
     /// Where the mesh ends, if a mask says so.
     pub fn outline(&self) -> Option<&Outline<D>> {
         self.0.outline.as_ref()

@@ -1,0 +1,244 @@
+//! Voronoi cells.
+
+use atomesh::geometry::Bounds;
+use atomesh::image::Units;
+use atomesh::mesh::{FacetGroup, PolyMesh, Regions};
+use atomesh_draw::{PictureFormat, Style};
+use atomesh_io::image::AnyImage;
+use atomesh_io::mesh::OwnedField;
+use atomesh_io::mesh::cells::LoadedCells;
+use atomesh_job::features::FeaturesRequest;
+use atomesh_job::flow::{FlowMesh, FlowOptions};
+use atomesh_job::options::{OutputOptions, RunConfig};
+use atomesh_job::sample::{Property, SampleRequest, SampledMesh};
+use atomesh_job::surfaces::groups_of_cells;
+use atomesh_job::{Dimension, JobError, Session};
+use serde_json::Value;
+
+use super::body::{Body, Group};
+use super::{Made, in_dimension, meta, of_file};
+use crate::edit::EditorBody;
+use crate::flow::{FlowBody, Flowing, solved};
+use crate::surface::Surface;
+
+/// Polygons or polyhedra around atoms, read or made.
+pub struct CellsBody<const D: usize> {
+    loaded: LoadedCells<D>,
+    /// VTK's list, and where each cell's entry begins.
+    list: Vec<u32>,
+    offsets: Vec<u32>,
+    facets: Vec<FacetGroup<D>>,
+    groups: Vec<Group>,
+    made: Option<Made<D>>,
+    dimension: Dimension<D>,
+}
+
+impl<const D: usize> CellsBody<D> {
+    /// Cells as read or made.
+    pub fn new(loaded: LoadedCells<D>, made: Option<Made<D>>, dimension: Dimension<D>) -> Self {
+        let facets = groups_of_cells(&loaded);
+        let flat =
+            |group: &FacetGroup<D>| (group.name.clone(), group.facets.as_flattened().to_vec());
+        let groups = facets.iter().map(flat).collect();
+        let (list, offsets) = vtk_list(&loaded.mesh);
+        Self { loaded, list, offsets, facets, groups, made, dimension }
+    }
+}
+
+/// The cells as VTK lists them, and where each begins.
+fn vtk_list<const D: usize>(mesh: &PolyMesh<D>) -> (Vec<u32>, Vec<u32>) {
+    let (mut list, mut offsets) = (Vec::new(), vec![0]);
+    for cell in 0..mesh.cell_count() {
+        let start = list.len();
+        list.push(0);
+        if D == 2 {
+            list.extend(mesh.polygon(cell));
+        } else {
+            list.push(0);
+            let mut faces = 0;
+            for (face, _) in mesh.faces_of(cell) {
+                let corners = mesh.face(face);
+                list.push(corners.len() as u32);
+                list.extend(corners);
+                faces += 1;
+            }
+            list[start + 1] = faces;
+        }
+        list[start] = (list.len() - start - 1) as u32;
+        offsets.push(list.len() as u32);
+    }
+    (list, offsets)
+}
+
+impl<const D: usize> Body for CellsBody<D> {
+    fn dimension(&self) -> usize {
+        D
+    }
+
+    fn cells_name(&self) -> &'static str {
+        self.dimension.voronoi_cells
+    }
+
+    fn is_voronoi(&self) -> bool {
+        true
+    }
+
+    fn cell_count(&self) -> usize {
+        self.loaded.mesh.cell_count()
+    }
+
+    fn points(&self) -> &[f64] {
+        self.loaded.mesh.points().as_flattened()
+    }
+
+    fn cells(&self) -> &[u32] {
+        &self.list
+    }
+
+    fn offsets(&self) -> Option<&[u32]> {
+        Some(&self.offsets)
+    }
+
+    fn sites(&self) -> Option<&[f64]> {
+        self.loaded.mesh.sites().map(<[_]>::as_flattened)
+    }
+
+    fn point_fields(&self) -> &[OwnedField] {
+        &[]
+    }
+
+    fn cell_fields(&self) -> &[OwnedField<f64>] {
+        &self.loaded.fields
+    }
+
+    fn groups(&self) -> &[Group] {
+        &self.groups
+    }
+
+    fn regions(&self) -> Option<&Regions> {
+        None
+    }
+
+    fn meta(&self) -> Value {
+        meta(Some(&self.loaded.frame), Some(&self.loaded.provenance))
+    }
+
+    fn quality(&self, _: &mut Session<'_>) -> Result<Value, JobError> {
+        let mesh = &self.loaded.mesh;
+        let report = match &self.made {
+            Some(Made { outcome, .. }) => {
+                let bounds = outcome.run().bounds();
+                outcome.cells().map(|cells| (self.dimension.tools.cells_shape)(cells, &bounds))
+            }
+            None => Bounds::of(mesh.points())
+                .map(|bounds| (self.dimension.tools.cells_shape)(mesh, &bounds)),
+        };
+        serde_json::to_value(report).map_err(JobError::content)
+    }
+
+    fn report(
+        &self,
+        _: &RunConfig,
+        image: Option<AnyImage>,
+        session: &mut Session<'_>,
+    ) -> Result<Value, JobError> {
+        match (&self.made, image) {
+            (Some(made), None) => made.as_job(&made.run, &[]).report(&self.dimension, session),
+            (None, None) => Err(of_file("report")),
+            _ => {
+                let message =
+                    "Voronoi cells are measured against the image that they were made from";
+                Err(JobError::misuse(message))
+            }
+        }
+    }
+
+    fn features(
+        &self,
+        request: &FeaturesRequest,
+        image: Option<AnyImage>,
+        _: &mut Session<'_>,
+    ) -> Result<Vec<Surface>, JobError> {
+        if image.is_some() || request.below.is_some() {
+            let message = "the faces of Voronoi cells on features were chosen when they were made";
+            return Err(JobError::misuse(message));
+        }
+        let own = self.facets.iter().filter(|group| atomesh::mesh::is_feature_name(&group.name));
+        let surface = |group: &FacetGroup<D>| {
+            Surface::new(group.name.clone(), self.loaded.mesh.points(), &group.facets, Value::Null)
+        };
+        Ok(own.map(surface).collect())
+    }
+
+    fn surface(&self, name: &str) -> Result<Surface, JobError> {
+        let Some(group) = self.facets.iter().find(|group| group.name == name) else {
+            let names: Vec<&str> = self.groups.iter().map(|(name, _)| name.as_str()).collect();
+            let message =
+                format!("no group of facets is named {name:?}; the mesh has {}", names.join(", "));
+            return Err(JobError::misuse(message));
+        };
+        let points = self.loaded.mesh.points();
+        Ok(Surface::new(group.name.clone(), points, &group.facets, Value::Null))
+    }
+
+    fn sample(
+        &self,
+        request: &SampleRequest,
+        name: &str,
+        image: AnyImage,
+        session: &mut Session<'_>,
+    ) -> Result<Vec<f64>, JobError> {
+        super::sampled(request, name, &self.loaded, image, &self.dimension, session)
+    }
+
+    fn flow(
+        &self,
+        options: &FlowOptions,
+        fields: Vec<Property>,
+        session: &mut Session<'_>,
+    ) -> Result<Box<dyn FlowBody>, JobError> {
+        let mesh = FlowMesh::of_cells(self.loaded.clone());
+        let flowing = Flowing { mesh, made: self.made.as_ref(), fields };
+        solved(flowing, options, self.dimension.clone(), session)
+    }
+
+    fn write(
+        &self,
+        output: OutputOptions,
+        properties: &[Property],
+        session: &mut Session<'_>,
+    ) -> Result<(), JobError> {
+        if let Some(made) = &self.made {
+            let run = RunConfig { output, ..made.run.clone() };
+            return made.as_job(&run, properties).write(&self.dimension, session).map(drop);
+        }
+        let path = super::output_alone(output)?;
+        self.loaded.check_output(&path)?;
+        session.write_together(|group, session| {
+            let staged = atomesh_job::files::stage(&path, group)?;
+            self.loaded.write(&staged, properties, &self.dimension, session)
+        })
+    }
+
+    fn picture(&self, image: Option<AnyImage>, max_side: f64) -> Result<Vec<u8>, JobError> {
+        let image = image.map(|image| in_dimension(image, &self.dimension)).transpose()?;
+        let image = match (&image, &self.made) {
+            (Some(image), _) => image,
+            (None, Some(made)) => &made.image,
+            (None, None) => return Err(of_file("picture")),
+        };
+        let frame = &self.loaded.frame;
+        let place = |p: &[f64; D]| frame.world_to_lattice(Units::Samples, p);
+        let cells = self.loaded.mesh.moved(frame.is_mirrored(), place);
+        let style = Style { max_side, ..Style::default() };
+        let picture = (self.dimension.drawing.cells)(image, &cells, &style);
+        let picture = picture.map_err(JobError::content)?;
+        picture.encode(PictureFormat::Png).map_err(JobError::content)
+    }
+
+    fn editor(&self, session: &mut Session<'_>) -> Result<Box<dyn EditorBody>, JobError> {
+        let made = self.made.as_ref().ok_or_else(|| of_file("edit"))?;
+        let sites = made.outcome.cells().and_then(PolyMesh::sites).unwrap_or_default();
+        crate::edit::editor(made, sites, self.dimension.clone(), session)
+    }
+}

@@ -1,0 +1,227 @@
+//! Triangles and tetrahedra.
+
+use atomesh::image::Units;
+use atomesh::mesh::{FacetGroup, Regions};
+use atomesh_draw::{PictureFormat, Style};
+use atomesh_io::image::AnyImage;
+use atomesh_io::mesh::{LoadedMesh, OwnedField};
+use atomesh_job::features::FeaturesRequest;
+use atomesh_job::flow::{FlowMesh, FlowOptions};
+use atomesh_job::measure::{Against, MeasureRequest, measure};
+use atomesh_job::options::{OutputOptions, RunConfig};
+use atomesh_job::sample::{Property, SampleRequest, SampledMesh};
+use atomesh_job::surfaces::{SurfacesRequest, surfaces};
+use atomesh_job::{Dimension, JobError, Session, mesh_file};
+use serde_json::Value;
+
+use super::body::{Body, Group};
+use super::{Made, in_dimension, meta, of_file};
+use crate::edit::EditorBody;
+use crate::flow::{FlowBody, Flowing, solved};
+use crate::surface::Surface;
+
+/// Triangles or tetrahedra, read or made.
+pub struct SimplexBody<const D: usize> {
+    loaded: LoadedMesh<D>,
+    groups: Vec<Group>,
+    made: Option<Made<D>>,
+    dimension: Dimension<D>,
+}
+
+impl<const D: usize> SimplexBody<D> {
+    /// A mesh as read or made.
+    pub fn new(loaded: LoadedMesh<D>, made: Option<Made<D>>, dimension: Dimension<D>) -> Self {
+        let flat =
+            |group: &FacetGroup<D>| (group.name.clone(), group.facets.as_flattened().to_vec());
+        let groups = loaded.tags.facet_groups().iter().map(flat).collect();
+        Self { loaded, groups, made, dimension }
+    }
+}
+
+impl<const D: usize> Body for SimplexBody<D> {
+    fn dimension(&self) -> usize {
+        D
+    }
+
+    fn cells_name(&self) -> &'static str {
+        self.dimension.cells
+    }
+
+    fn is_voronoi(&self) -> bool {
+        false
+    }
+
+    fn cell_count(&self) -> usize {
+        self.loaded.mesh.cell_count()
+    }
+
+    fn points(&self) -> &[f64] {
+        self.loaded.mesh.points().as_flattened()
+    }
+
+    fn cells(&self) -> &[u32] {
+        self.loaded.mesh.corners()
+    }
+
+    fn offsets(&self) -> Option<&[u32]> {
+        None
+    }
+
+    fn sites(&self) -> Option<&[f64]> {
+        None
+    }
+
+    fn point_fields(&self) -> &[OwnedField] {
+        &self.loaded.point_fields
+    }
+
+    fn cell_fields(&self) -> &[OwnedField<f64>] {
+        &self.loaded.cell_fields
+    }
+
+    fn groups(&self) -> &[Group] {
+        &self.groups
+    }
+
+    fn regions(&self) -> Option<&Regions> {
+        self.loaded.tags.regions()
+    }
+
+    fn meta(&self) -> Value {
+        meta(self.loaded.frame.as_ref(), self.loaded.provenance.as_ref())
+    }
+
+    fn quality(&self, session: &mut Session<'_>) -> Result<Value, JobError> {
+        let shape = self.dimension.tools.shape;
+        let found = match &self.made {
+            Some(Made { outcome, .. }) => {
+                shape(outcome.mesh(), outcome.bounds().as_ref(), session)?
+            }
+            None => shape(&mesh_file::oriented(self.loaded.mesh.clone()), None, session)?,
+        };
+        serde_json::to_value(found).map_err(JobError::content)
+    }
+
+    fn report(
+        &self,
+        run: &RunConfig,
+        image: Option<AnyImage>,
+        session: &mut Session<'_>,
+    ) -> Result<Value, JobError> {
+        let Some(image) = image else {
+            let made = self.made.as_ref().ok_or_else(|| of_file("report"))?;
+            return made.as_job(&made.run, &[]).report(&self.dimension, session);
+        };
+        let image = run.frame.place(in_dimension(image, &self.dimension)?)?;
+        let units = run.lattice.units.unwrap_or_default();
+        let potential =
+            atomesh_job::enhance::enhance(&image, &run.features, units, &self.dimension, session)?;
+        let mut against = Against::potential(potential.image)?;
+        against.image = Some(image);
+        let size = run.lattice.wanted_length();
+        let request = MeasureRequest { size, units: run.lattice.units, ..Default::default() };
+        let report = measure(&request, &self.loaded, &against, &self.dimension, session)?;
+        serde_json::to_value(report).map_err(JobError::content)
+    }
+
+    fn features(
+        &self,
+        request: &FeaturesRequest,
+        image: Option<AnyImage>,
+        session: &mut Session<'_>,
+    ) -> Result<Vec<Surface>, JobError> {
+        let image = image.map(|image| in_dimension(image, &self.dimension)).transpose()?;
+        let image = image.map(|image| request.frame.place(image)).transpose()?;
+        let found = match (&self.made, request.below, &image) {
+            // the run's own b, which is known between points too
+            (Some(made), Some(_), None) => {
+                let (outcome, tools) = (&made.outcome, self.dimension.tools);
+                let field = (tools.field_along)(outcome.mesh(), outcome.potential(), session)?;
+                (tools.find_features)(&self.loaded.mesh, &field, &request.facet_options())?
+            }
+            _ => {
+                let dimension = &self.dimension;
+                atomesh_job::features::features(request, &self.loaded, image, dimension, session)?
+            }
+        };
+        let mesh = &self.loaded.mesh;
+        let reports = found.report(mesh);
+        let features = found.features.iter().zip(reports);
+        let made = features.map(|(feature, report)| {
+            let report = serde_json::to_value(&report).unwrap_or_default();
+            let name = report["name"].as_str().unwrap_or_default().to_owned();
+            Surface::new(name, mesh.points(), &feature.facets, report)
+        });
+        Ok(made.collect())
+    }
+
+    fn surface(&self, name: &str) -> Result<Surface, JobError> {
+        let is_group = self.groups.iter().any(|(group, _)| group == name);
+        let (group, region) = match is_group || self.regions().is_none() {
+            true => (vec![name.to_owned()], Vec::new()),
+            false => (Vec::new(), vec![name.to_owned()]),
+        };
+        let request = SurfacesRequest { group, region, ..Default::default() };
+        let mut found = surfaces(&request, &self.loaded)?;
+        let FacetGroup { name, facets, .. } = found.swap_remove(0);
+        Ok(Surface::new(name, self.loaded.mesh.points(), &facets, Value::Null))
+    }
+
+    fn sample(
+        &self,
+        request: &SampleRequest,
+        name: &str,
+        image: AnyImage,
+        session: &mut Session<'_>,
+    ) -> Result<Vec<f64>, JobError> {
+        super::sampled(request, name, &self.loaded, image, &self.dimension, session)
+    }
+
+    fn flow(
+        &self,
+        options: &FlowOptions,
+        fields: Vec<Property>,
+        session: &mut Session<'_>,
+    ) -> Result<Box<dyn FlowBody>, JobError> {
+        let mesh = FlowMesh::of_mesh(self.loaded.clone(), self.dimension.tools)?;
+        let flowing = Flowing { mesh, made: self.made.as_ref(), fields };
+        solved(flowing, options, self.dimension.clone(), session)
+    }
+
+    fn write(
+        &self,
+        output: OutputOptions,
+        properties: &[Property],
+        session: &mut Session<'_>,
+    ) -> Result<(), JobError> {
+        if let Some(made) = &self.made {
+            let run = RunConfig { output, ..made.run.clone() };
+            return made.as_job(&run, properties).write(&self.dimension, session).map(drop);
+        }
+        let path = super::output_alone(output)?;
+        session.write_together(|group, session| {
+            let staged = atomesh_job::files::stage(&path, group)?;
+            self.loaded.write(&staged, properties, &self.dimension, session)
+        })
+    }
+
+    fn picture(&self, image: Option<AnyImage>, max_side: f64) -> Result<Vec<u8>, JobError> {
+        let image = image.map(|image| in_dimension(image, &self.dimension)).transpose()?;
+        let image = match (&image, &self.made) {
+            (Some(image), _) => image,
+            (None, Some(made)) => &made.image,
+            (None, None) => return Err(of_file("picture")),
+        };
+        let frame = self.loaded.frame.as_ref().unwrap_or(image.frame());
+        let mesh = (self.dimension.tools.lattice_mesh)(&self.loaded.mesh, frame, Units::Samples);
+        let style = Style { max_side, ..Style::default() };
+        let picture = (self.dimension.drawing.mesh)(image, &mesh, &style);
+        let picture = picture.map_err(JobError::content)?;
+        picture.encode(PictureFormat::Png).map_err(JobError::content)
+    }
+
+    fn editor(&self, session: &mut Session<'_>) -> Result<Box<dyn EditorBody>, JobError> {
+        let made = self.made.as_ref().ok_or_else(|| of_file("edit"))?;
+        crate::edit::editor(made, made.outcome.mesh().points(), self.dimension.clone(), session)
+    }
+}

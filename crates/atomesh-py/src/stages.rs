@@ -1,0 +1,730 @@
+//! Stages of a run: a lattice of atoms, its optimisation step by step, and what connects it.
+
+use std::ops::ControlFlow;
+use std::panic::{AssertUnwindSafe, catch_unwind};
+use std::sync::mpsc::{Receiver, RecvTimeoutError, SyncSender, sync_channel};
+use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
+use std::time::Duration;
+
+use atomesh::image::Image as CoreImage;
+use atomesh::lattice::Lattice as CoreLattice;
+use atomesh::run::{Connected as CoreConnected, Filled, Prepared, RunError, Settled};
+use atomesh::watch::{AtomsView, Phase, Watch};
+use atomesh_io::image::AnyImage;
+use atomesh_job::mesh::{MeshImages, ShownImage, prepare, refusal};
+use atomesh_job::options::RunConfig;
+use atomesh_job::{Dimension, JobError, Session};
+use pyo3::exceptions::PyRuntimeError;
+use pyo3::prelude::*;
+use pyo3::types::{PyDict, PyType};
+
+use crate::mesh::{Body, Made, Mesh, Opened, Source, placed};
+use crate::options::{MESH, Wishes};
+use crate::work::{How, pool, work};
+use crate::{arrays, errors};
+
+/// How often signals are asked for while a step is waited for.
+const TICK: Duration = Duration::from_millis(20);
+
+/// How far the atoms have come.
+enum State<const D: usize> {
+    /// They fill the box.
+    Filled(Filled<D>),
+    /// They were moved, and not to the end.
+    Between(CoreLattice<D>),
+    /// Their energy is low.
+    Settled(Settled<D>),
+}
+
+/// A lattice of either dimension.
+trait LatticeBody: Send {
+    fn dimension(&self) -> usize;
+    /// World coordinates of all atoms.
+    fn atoms(&self) -> Vec<f64>;
+    /// The work of moving the atoms with other options, from where they are.
+    ///
+    /// # Errors
+    /// [`JobError`] if an option is out of range or an image is of no use.
+    fn restart(
+        &mut self,
+        wishes: Option<Wishes>,
+        session: &mut Session<'_>,
+    ) -> Result<Box<dyn Moving>, JobError>;
+    /// Takes atoms between two iterations; lattice coordinates.
+    fn put(&mut self, coordinates: &[f64]) -> Result<(), JobError>;
+    /// Takes what moving them gave.
+    fn settle(&mut self, settled: Box<dyn std::any::Any + Send>);
+    /// Lattice coordinates in the world.
+    fn in_world(&self, coordinates: &[f64]) -> Vec<f64>;
+    /// Connects the atoms.
+    ///
+    /// # Errors
+    /// [`JobError`] if they make no mesh.
+    fn connect(&self, session: &mut Session<'_>) -> Result<Box<dyn ConnectedBody>, JobError>;
+}
+
+/// Atoms that are about to be moved, apart from Python.
+trait Moving: Send {
+    /// Moves them to the end.
+    ///
+    /// # Errors
+    /// [`JobError`] if the watch ends the work.
+    fn run(
+        self: Box<Self>,
+        watch: &mut dyn Watch,
+    ) -> Result<Box<dyn std::any::Any + Send>, JobError>;
+}
+
+/// Connected atoms of either dimension.
+trait ConnectedBody: Send {
+    fn points(&self) -> Vec<f64>;
+    fn corners(&self) -> Vec<u32>;
+    fn dimension(&self) -> usize;
+    /// Mends cells and turns facets onto features.
+    ///
+    /// # Errors
+    /// [`JobError`] if the watch ends the work.
+    fn improve(&self, session: &mut Session<'_>) -> Result<Box<dyn Body>, JobError>;
+}
+
+/// What a lattice is made in.
+#[derive(Clone)]
+struct Parts<const D: usize> {
+    images: MeshImages<D>,
+    run: RunConfig,
+    image: CoreImage<D>,
+    prepared: Prepared<D>,
+    dimension: Dimension<D>,
+}
+
+struct Held<const D: usize> {
+    parts: Parts<D>,
+    state: State<D>,
+}
+
+struct Atoms<const D: usize> {
+    filled: Filled<D>,
+    run: RunConfig,
+}
+
+impl<const D: usize> Moving for Atoms<D> {
+    fn run(
+        self: Box<Self>,
+        watch: &mut dyn Watch,
+    ) -> Result<Box<dyn std::any::Any + Send>, JobError> {
+        let Atoms { filled, run } = *self;
+        let settled = filled.settle(watch).map_err(|e| refusal(&run, e))?;
+        Ok(Box::new(settled))
+    }
+}
+
+impl<const D: usize> Held<D> {
+    fn lattice(&self) -> &CoreLattice<D> {
+        match &self.state {
+            State::Filled(filled) => filled.lattice(),
+            State::Between(lattice) => lattice,
+            State::Settled(settled) => settled.lattice(),
+        }
+    }
+
+    fn refused(&self) -> impl Fn(RunError) -> JobError + '_ {
+        |error| refusal(&self.parts.run, error)
+    }
+}
+
+impl<const D: usize> LatticeBody for Held<D> {
+    fn dimension(&self) -> usize {
+        D
+    }
+
+    fn atoms(&self) -> Vec<f64> {
+        self.in_world(self.lattice().atoms().as_flattened())
+    }
+
+    fn restart(
+        &mut self,
+        wishes: Option<Wishes>,
+        session: &mut Session<'_>,
+    ) -> Result<Box<dyn Moving>, JobError> {
+        if let Some(Wishes { run, fields, .. }) = wishes {
+            let Parts { images, dimension, .. } = &self.parts;
+            let mut images = images.clone();
+            let given = Wishes::given(fields, dimension)?;
+            let mut run = run;
+            if given.potential.is_some() {
+                run.input.potential = Some("potential".into());
+            }
+            images.take_given(&run, given, session)?;
+            let (prepared, image) = prepare(&run, images.clone(), dimension, session)?;
+            self.parts.images = images;
+            (self.parts.run, self.parts.image, self.parts.prepared) = (run, image, prepared);
+        }
+        let Parts { prepared, run, .. } = &self.parts;
+        let filled = prepared.with_atoms(self.lattice().clone()).map_err(self.refused())?;
+        Ok(Box::new(Atoms { filled, run: run.clone() }))
+    }
+
+    fn put(&mut self, coordinates: &[f64]) -> Result<(), JobError> {
+        let atoms = coordinates.as_chunks::<D>().0.to_vec();
+        let lattice = CoreLattice::from_atoms(self.parts.prepared.bounds(), atoms);
+        self.state = State::Between(lattice.map_err(JobError::content)?);
+        Ok(())
+    }
+
+    fn settle(&mut self, settled: Box<dyn std::any::Any + Send>) {
+        if let Ok(settled) = settled.downcast::<Settled<D>>() {
+            self.state = State::Settled(*settled);
+        }
+    }
+
+    fn in_world(&self, coordinates: &[f64]) -> Vec<f64> {
+        let (frame, units) = (self.parts.prepared.frame(), self.parts.prepared.options().units);
+        let places = coordinates.as_chunks::<D>().0.iter();
+        places.flat_map(|p| frame.lattice_to_world(units, p)).collect()
+    }
+
+    fn connect(&self, session: &mut Session<'_>) -> Result<Box<dyn ConnectedBody>, JobError> {
+        let settled = match &self.state {
+            State::Settled(settled) => settled.clone(),
+            _ => {
+                let lattice = self.lattice().clone();
+                self.parts.prepared.with_settled(lattice).map_err(self.refused())?
+            }
+        };
+        let connected = settled.clone().connect(session).map_err(self.refused())?;
+        Ok(Box::new(Joined { parts: self.parts.clone(), settled, connected }))
+    }
+}
+
+struct Joined<const D: usize> {
+    parts: Parts<D>,
+    settled: Settled<D>,
+    connected: CoreConnected<D>,
+}
+
+impl<const D: usize> ConnectedBody for Joined<D> {
+    fn points(&self) -> Vec<f64> {
+        let (frame, units) = (self.parts.prepared.frame(), self.parts.prepared.options().units);
+        let points = self.connected.mesh().points().iter();
+        points.flat_map(|p| frame.lattice_to_world(units, p)).collect()
+    }
+
+    fn corners(&self) -> Vec<u32> {
+        let mirrored = self.parts.prepared.frame().is_mirrored();
+        self.connected.mesh().moved(mirrored, |p| *p).corners().to_vec()
+    }
+
+    fn dimension(&self) -> usize {
+        D
+    }
+
+    fn improve(&self, session: &mut Session<'_>) -> Result<Box<dyn Body>, JobError> {
+        let Parts { run, image, images, dimension, .. } = &self.parts;
+        let outcome = (|| match run.is_voronoi() {
+            true => self.settled.clone().divide(session)?.finish(session),
+            false => self.connected.clone().improve(session)?.finish(session),
+        })();
+        let outcome = outcome.map_err(|e| refusal(run, e))?;
+        let units = images.units.clone();
+        Made { run: run.clone(), outcome, image: image.clone(), units }.into_body(dimension.clone())
+    }
+}
+
+type Shared = Arc<Mutex<Box<dyn LatticeBody>>>;
+
+fn own(body: &Shared) -> MutexGuard<'_, Box<dyn LatticeBody>> {
+    body.lock().unwrap_or_else(PoisonError::into_inner)
+}
+
+/// A lattice of atoms in the box of an image: what is moved by `optimize` and joined by `connect`.
+///
+/// `lattice` grows one; `Lattice.of` takes one's own atoms.
+///
+/// Examples
+/// --------
+/// >>> import numpy as np, atomesh as am
+/// >>> img = np.full((60, 80), 200, np.uint8); img[30, :] = 10
+/// >>> lat = am.lattice(img, distance=8)
+/// >>> energies = [step.energy for step in lat.optimize()]
+/// >>> energies[-1] < energies[0]
+/// True
+/// >>> mesh = lat.connect().improve()
+#[pyclass(frozen, module = "atomesh")]
+pub struct Lattice {
+    body: Shared,
+    wishes: Mutex<RunConfig>,
+    notes: Vec<String>,
+}
+
+#[pymethods]
+impl Lattice {
+    /// A lattice of one's own atoms.
+    ///
+    /// Parameters
+    /// ----------
+    /// points : array_like, shape (n, D)
+    ///     World coordinates, x first. One must be at each corner of the image's box; those on its sides stay on them.
+    /// image : Image, array or path-like
+    ///     The image.
+    /// **options
+    ///     As of `mesh`.
+    ///
+    /// Returns
+    /// -------
+    /// Lattice
+    #[classmethod]
+    #[pyo3(signature = (points, image, **options))]
+    fn of(
+        _: &Bound<'_, PyType>,
+        py: Python<'_>,
+        points: &Bound<'_, PyAny>,
+        image: &Bound<'_, PyAny>,
+        options: Option<&Bound<'_, PyDict>>,
+    ) -> PyResult<Self> {
+        let axes: usize = points
+            .py()
+            .import("numpy")?
+            .call_method1("shape", (points,))?
+            .get_item(1)
+            .and_then(|axes| axes.extract())
+            .map_err(|_| errors::input(py, "points of another shape than (n, D)"))?;
+        let own = match axes {
+            2 => Own::Flat(arrays::points(points)?),
+            _ => Own::Volume(arrays::points(points)?),
+        };
+        made(py, "Lattice.of", image, options, Some(own))
+    }
+
+    /// World coordinates of the atoms, shape (n, D), float64.
+    #[getter]
+    fn atoms<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyAny>> {
+        let (atoms, axes) = {
+            let body = own(&self.body);
+            (body.atoms(), body.dimension())
+        };
+        numpy::PyArray1::from_vec(py, atoms)
+            .into_any()
+            .call_method1("reshape", ((-1, axes as isize),))
+    }
+
+    /// Warnings and what was changed or not met.
+    #[getter]
+    fn notes(&self) -> Vec<String> {
+        self.notes.clone()
+    }
+
+    /// Moves the atoms to lower their energy (Hale 2001, algorithm 3), step by step.
+    ///
+    /// The work goes on only while steps are asked for: leaving the loop stops it, and the atoms stay where the last step
+    /// has them.
+    ///
+    /// Parameters
+    /// ----------
+    /// potential : Image or array, optional
+    ///     b(x), -1 to 1, in place of the image's features.
+    /// beta : float or image, optional
+    ///     Weight of the image against regularity, 0 to 1.
+    /// **options
+    ///     As of `mesh`: `engine`, `tolerance` ...
+    ///
+    /// Returns
+    /// -------
+    /// iterator of Step
+    #[pyo3(signature = (**options))]
+    fn optimize(&self, py: Python<'_>, options: Option<&Bound<'_, PyDict>>) -> PyResult<Steps> {
+        let wishes = self.wishes(options)?;
+        let body = Arc::clone(&self.body);
+        let threads = wishes.as_ref().and_then(|wishes| wishes.how.threads);
+        let how = How { threads, ..How::default() };
+        let job = move |session: &mut Session<'_>| own(&body).restart(wishes, session);
+        let (moving, _) = work(py, &how, job)?;
+        Steps::start(py, Arc::clone(&self.body), moving, threads)
+    }
+
+    /// Moves the atoms to the end, as `optimize` without a look at the steps.
+    ///
+    /// Parameters
+    /// ----------
+    /// **options
+    ///     As of `optimize`; also `progress`, `threads`.
+    ///
+    /// Returns
+    /// -------
+    /// Lattice
+    ///     Itself.
+    #[pyo3(signature = (**options))]
+    fn settle<'py>(
+        slf: &Bound<'py, Self>,
+        options: Option<&Bound<'py, PyDict>>,
+    ) -> PyResult<Bound<'py, Self>> {
+        let mut wishes = slf.get().wishes(options)?;
+        let how = wishes.as_mut().map(|wishes| std::mem::take(&mut wishes.how)).unwrap_or_default();
+        let body = Arc::clone(&slf.get().body);
+        let job = move |session: &mut Session<'_>| {
+            let moving = own(&body).restart(wishes, session)?;
+            let settled = moving.run(session)?;
+            own(&body).settle(settled);
+            Ok(())
+        };
+        work(slf.py(), &how, job)?;
+        Ok(slf.clone())
+    }
+
+    /// Connects the atoms by Delaunay's rule, where they are now.
+    ///
+    /// Returns
+    /// -------
+    /// Connected
+    fn connect(&self, py: Python<'_>) -> PyResult<Connected> {
+        let body = Arc::clone(&self.body);
+        let job = move |session: &mut Session<'_>| own(&body).connect(session);
+        let (connected, _) = work(py, &How::default(), job)?;
+        Ok(Connected { body: Arc::new(Mutex::new(connected)) })
+    }
+
+    fn __len__(&self) -> usize {
+        let body = own(&self.body);
+        body.atoms().len() / body.dimension()
+    }
+
+    fn __repr__(&self) -> String {
+        format!("Lattice({} atoms)", self.__len__())
+    }
+}
+
+impl Lattice {
+    /// The options of the run with these before them; `None` if none are given.
+    fn wishes(&self, options: Option<&Bound<'_, PyDict>>) -> PyResult<Option<Wishes>> {
+        let Some(options) = options.filter(|options| !options.is_empty()) else { return Ok(None) };
+        let mut kept = self.wishes.lock().unwrap_or_else(PoisonError::into_inner);
+        let before = Wishes { run: kept.clone(), ..Wishes::default() };
+        let wishes = before.with("optimize", Some(options), MESH)?;
+        *kept = wishes.run.clone();
+        Ok(Some(wishes))
+    }
+}
+
+/// Atoms of one's own.
+enum Own {
+    Flat(Vec<[f64; 2]>),
+    Volume(Vec<[f64; 3]>),
+}
+
+/// A lattice of atoms that fill the box of an image, about d(x) apart, not yet moved by the image.
+///
+/// Parameters
+/// ----------
+/// image : Image, array or path-like
+///     The image.
+/// distance : float, (float, float) or image, optional
+///     d(x): as `size` of `mesh`.
+/// crystal : str, optional
+///     "hexagonal" (in the plane), "bcc" or "fcc" (in space), or "random". Default: "hexagonal", "bcc".
+/// **options
+///     As of `mesh`.
+///
+/// Returns
+/// -------
+/// Lattice
+///
+/// Examples
+/// --------
+/// >>> import numpy as np, atomesh as am
+/// >>> am.lattice(np.zeros((41, 61)), distance=10).atoms.shape[1]
+/// 2
+#[pyfunction]
+#[pyo3(signature = (image, distance = None, crystal = None, **options))]
+pub fn lattice(
+    py: Python<'_>,
+    image: &Bound<'_, PyAny>,
+    distance: Option<&Bound<'_, PyAny>>,
+    crystal: Option<&str>,
+    options: Option<&Bound<'_, PyDict>>,
+) -> PyResult<Lattice> {
+    let all = options.map_or_else(|| Ok(PyDict::new(py)), |given| given.copy())?;
+    if let Some(distance) = distance {
+        all.set_item("size", distance)?;
+    }
+    if let Some(crystal) = crystal {
+        all.set_item("lattice", crystal)?;
+    }
+    made(py, "lattice", image, Some(&all), None)
+}
+
+fn made(
+    py: Python<'_>,
+    function: &str,
+    image: &Bound<'_, PyAny>,
+    options: Option<&Bound<'_, PyDict>>,
+    atoms: Option<Own>,
+) -> PyResult<Lattice> {
+    let mut wishes = Wishes::take(function, options, MESH)?;
+    let source = Source::take(image, &mut wishes)?;
+    let Wishes { mut run, fields, how } = wishes;
+    let kept = run.clone();
+    let (body, notes) = work(py, &how, move |session| {
+        run.check()?;
+        let Opened { image, units, is_potential } = source.open(&mut run, session)?;
+        match image {
+            AnyImage::Flat(image) => {
+                let (dimension, shown) = (Dimension::plane(), ShownImage { image, units });
+                let images = placed(&mut run, shown, is_potential, fields, &dimension, session)?;
+                let atoms = match atoms {
+                    None => None,
+                    Some(Own::Flat(atoms)) => Some(atoms),
+                    Some(Own::Volume(_)) => return Err(other_dimension(3, 2)),
+                };
+                held(run, images, dimension, atoms, session)
+            }
+            AnyImage::Volume(image) => {
+                let (dimension, shown) = (Dimension::space(), ShownImage { image, units });
+                let images = placed(&mut run, shown, is_potential, fields, &dimension, session)?;
+                let atoms = match atoms {
+                    None => None,
+                    Some(Own::Volume(atoms)) => Some(atoms),
+                    Some(Own::Flat(_)) => return Err(other_dimension(2, 3)),
+                };
+                held(run, images, dimension, atoms, session)
+            }
+        }
+    })?;
+    let notes = notes.iter().map(errors::words).collect();
+    Ok(Lattice { body: Arc::new(Mutex::new(body)), wishes: Mutex::new(kept), notes })
+}
+
+fn other_dimension(found: usize, expected: usize) -> JobError {
+    JobError::misuse(format!("points of {found} coordinates; expected {expected}, as the image"))
+}
+
+fn held<const D: usize>(
+    run: RunConfig,
+    images: MeshImages<D>,
+    dimension: Dimension<D>,
+    atoms: Option<Vec<[f64; D]>>,
+    session: &mut Session<'_>,
+) -> Result<Box<dyn LatticeBody>, JobError> {
+    let (prepared, image) = prepare(&run, images.clone(), &dimension, session)?;
+    let refused = |error| refusal(&run, error);
+    let state = match atoms {
+        None => State::Filled(prepared.fill(session).map_err(refused)?),
+        Some(atoms) => {
+            let (frame, units) = (prepared.frame(), prepared.options().units);
+            let bounds = prepared.bounds();
+            let place = |p: &[f64; D]| bounds.snap(&frame.world_to_lattice(units, p), 0.0);
+            let atoms: Vec<[f64; D]> = atoms.iter().map(place).collect();
+            State::Between(CoreLattice::from_atoms(bounds, atoms).map_err(JobError::misuse)?)
+        }
+    };
+    let parts = Parts { images, run, image, prepared, dimension };
+    Ok(Box::new(Held { parts, state }))
+}
+
+/// Atoms between two iterations of the optimiser.
+///
+/// Attributes: `number` of the step from 1, `energy` of all (without unit), `energy_atomic` and `energy_image`, the parts of
+/// the pairs and of the image.
+#[pyclass(frozen, module = "atomesh")]
+pub struct Step {
+    /// The number of the step, from 1.
+    #[pyo3(get)]
+    number: usize,
+    /// The energy.
+    #[pyo3(get)]
+    energy: f64,
+    /// (1 − β) A.
+    #[pyo3(get)]
+    energy_atomic: f64,
+    /// β B.
+    #[pyo3(get)]
+    energy_image: f64,
+    dimension: usize,
+    atoms: Arc<Vec<f64>>,
+}
+
+#[pymethods]
+impl Step {
+    /// World coordinates of the atoms, shape (n, D), float64; read-only.
+    #[getter]
+    fn atoms<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyAny>> {
+        let shape = [self.atoms.len() / self.dimension, self.dimension];
+        Ok(arrays::view(py, &self.atoms, |atoms| atoms, &shape)?.into_any())
+    }
+
+    fn __repr__(&self) -> String {
+        let count = self.atoms.len() / self.dimension;
+        format!("Step({}: energy {:.6}, {count} atoms)", self.number, self.energy)
+    }
+}
+
+/// What the moving atoms say.
+enum Said {
+    Moved { atoms: Vec<f64>, atomic: f64, image: f64 },
+    Done(Result<Box<dyn std::any::Any + Send>, JobError>),
+}
+
+/// Says where the atoms are, and waits until somebody wants to know where they are next.
+struct Teller {
+    to: SyncSender<Said>,
+    wanted: Receiver<()>,
+    is_gone: bool,
+}
+
+impl Watch for Teller {
+    fn step(&mut self, _: Phase, _: f64, _: Option<f64>) -> ControlFlow<()> {
+        if self.is_gone { ControlFlow::Break(()) } else { ControlFlow::Continue(()) }
+    }
+
+    fn atoms(&mut self, _: Phase, view: AtomsView<'_>) {
+        let moved = Said::Moved {
+            atoms: view.coordinates.to_vec(),
+            atomic: view.energy_atomic,
+            image: view.energy_image,
+        };
+        self.is_gone |= self.to.send(moved).is_err() || self.wanted.recv().is_err();
+    }
+}
+
+/// The ends of the channels to atoms that move.
+struct Channels {
+    from: Receiver<Said>,
+    wants: SyncSender<()>,
+    count: usize,
+}
+
+/// Steps of `Lattice.optimize`, one after another.
+#[pyclass(frozen, module = "atomesh")]
+pub struct Steps {
+    body: Shared,
+    channels: Mutex<Option<Channels>>,
+}
+
+impl Steps {
+    /// Starts moving atoms; they wait for the first step to be asked for.
+    fn start(
+        py: Python<'_>,
+        body: Shared,
+        moving: Box<dyn Moving>,
+        threads: Option<usize>,
+    ) -> PyResult<Self> {
+        let (to, from) = sync_channel(1);
+        let (wants, wanted) = sync_channel(1);
+        let pool = pool(py, threads)?;
+        // a thread of its own: a pool's would be blocked while nobody asks
+        let work = move || {
+            if wanted.recv().is_err() {
+                return;
+            }
+            let mut teller = Teller { to: to.clone(), wanted, is_gone: false };
+            let done = catch_unwind(AssertUnwindSafe(|| pool.install(|| moving.run(&mut teller))));
+            let _ = to.send(Said::Done(done.unwrap_or_else(|_| Err(bug()))));
+        };
+        let named = std::thread::Builder::new().name("atomesh-steps".into());
+        named.spawn(work).map_err(|e| PyRuntimeError::new_err(format!("no thread: {e}")))?;
+        Ok(Self { body, channels: Mutex::new(Some(Channels { from, wants, count: 0 })) })
+    }
+}
+
+fn bug() -> JobError {
+    JobError::content("a panic; this is a bug in atomesh; please report it")
+}
+
+#[pymethods]
+impl Steps {
+    fn __iter__(slf: Py<Self>) -> Py<Self> {
+        slf
+    }
+
+    fn __next__(&self, py: Python<'_>) -> PyResult<Option<Step>> {
+        let taken = self.channels.lock().unwrap_or_else(PoisonError::into_inner).take();
+        let Some(mut channels) = taken else { return Ok(None) };
+        let _ = channels.wants.send(());
+        let channels_of = Mutex::new(channels.from);
+        let said = loop {
+            let heard = py.detach(|| {
+                channels_of.lock().unwrap_or_else(PoisonError::into_inner).recv_timeout(TICK)
+            });
+            match heard {
+                Ok(said) => break said,
+                // without its channels the work ends at its next step
+                Err(RecvTimeoutError::Timeout) => py.check_signals()?,
+                Err(RecvTimeoutError::Disconnected) => break Said::Done(Err(bug())),
+            }
+        };
+        channels.from = channels_of.into_inner().unwrap_or_else(PoisonError::into_inner);
+        match said {
+            Said::Done(done) => {
+                let settled = done.map_err(|error| errors::raise(py, &error))?;
+                own(&self.body).settle(settled);
+                Ok(None)
+            }
+            Said::Moved { atoms, atomic, image } => {
+                let (world, dimension) = {
+                    let mut body = own(&self.body);
+                    body.put(&atoms).map_err(|error| errors::raise(py, &error))?;
+                    (body.in_world(&atoms), body.dimension())
+                };
+                channels.count += 1;
+                let step = Step {
+                    number: channels.count,
+                    energy: atomic + image,
+                    energy_atomic: atomic,
+                    energy_image: image,
+                    dimension,
+                    atoms: Arc::new(world),
+                };
+                *self.channels.lock().unwrap_or_else(PoisonError::into_inner) = Some(channels);
+                Ok(Some(step))
+            }
+        }
+    }
+}
+
+/// Atoms connected by Delaunay's rule, before facets are turned onto features. `Lattice.connect` gives it.
+#[pyclass(frozen, module = "atomesh")]
+pub struct Connected {
+    body: Arc<Mutex<Box<dyn ConnectedBody>>>,
+}
+
+#[pymethods]
+impl Connected {
+    /// The points, shape (n, D), float64, world coordinates.
+    #[getter]
+    fn points<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyAny>> {
+        let (points, axes) = {
+            let body = self.body.lock().unwrap_or_else(PoisonError::into_inner);
+            (body.points(), body.dimension())
+        };
+        let points = numpy::PyArray1::from_vec(py, points).into_any();
+        points.call_method1("reshape", ((-1, axes as isize),))
+    }
+
+    /// The numbers of the points of each cell, shape (m, D + 1), uint32.
+    #[getter]
+    fn cells<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyAny>> {
+        let (corners, axes) = {
+            let body = self.body.lock().unwrap_or_else(PoisonError::into_inner);
+            (body.corners(), body.dimension())
+        };
+        let corners = numpy::PyArray1::from_vec(py, corners).into_any();
+        corners.call_method1("reshape", ((-1, axes as isize + 1),))
+    }
+
+    /// Turns facets onto features and mends badly shaped cells; of Voronoi cells: divides the box among the atoms.
+    ///
+    /// Returns
+    /// -------
+    /// Mesh
+    fn improve(&self, py: Python<'_>) -> PyResult<Mesh> {
+        let body = Arc::clone(&self.body);
+        let job = move |session: &mut Session<'_>| {
+            body.lock().unwrap_or_else(PoisonError::into_inner).improve(session)
+        };
+        let (body, notes) = work(py, &How::default(), job)?;
+        Mesh::new(py, body, notes.iter().map(errors::words).collect())
+    }
+
+    fn __repr__(&self) -> String {
+        let body = self.body.lock().unwrap_or_else(PoisonError::into_inner);
+        format!("Connected({} cells)", body.corners().len() / (body.dimension() + 1))
+    }
+}
