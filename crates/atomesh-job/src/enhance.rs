@@ -83,7 +83,8 @@ pub fn enhance<const D: usize>(
     };
     let made = (dimension.tools.enhance_mixture)(&mixture, &options, image, session)?;
     let Enhanced { values, constant, .. } = made;
-    let image = Image::new(*image.frame(), Samples::F32(values)).map_err(JobError::content)?;
+    let image =
+        Image::new(*image.frame(), Samples::F32(values.into())).map_err(JobError::content)?;
     Ok(Potential { image, mixture, is_constant: constant })
 }
 

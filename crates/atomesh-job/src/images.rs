@@ -250,7 +250,7 @@ fn blank<const D: usize>(image: Image<D>) -> Image<D> {
     let (frame, samples) = image.into_parts();
     let mut values: Vec<f64> = (0..samples.len()).map(|i| samples.get(i)).collect();
     values.iter_mut().zip(absent).filter(|(_, a)| *a).for_each(|(v, _)| *v = f64::NAN);
-    Image::new(frame, Samples::F64(values)).expect("there are as many samples as before")
+    Image::new(frame, Samples::F64(values.into())).expect("there are as many samples as before")
 }
 
 /// Whether pictures show z upwards: it grows that way in the image's format, and along its last axis.

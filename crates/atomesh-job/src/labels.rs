@@ -124,12 +124,12 @@ mod tests {
 
     #[test]
     fn labels_near_to_whole_numbers_are_rounded_and_others_stay() {
-        let (samples, odd) = labels(Samples::F32(vec![0.0, 0.99998, 6.9995, -2.0004]));
-        assert_eq!(samples, Samples::F32(vec![0.0, 1.0, 7.0, -2.0]));
+        let (samples, odd) = labels(Samples::F32(vec![0.0, 0.99998, 6.9995, -2.0004].into()));
+        assert_eq!(samples, Samples::F32(vec![0.0, 1.0, 7.0, -2.0].into()));
         assert!(matches!(odd[..], [Oddity::Rounded { most }] if (most - 5e-4).abs() < 1e-6));
-        let (samples, odd) = labels(Samples::F64(vec![1.002, 2.0]));
-        assert_eq!((samples, odd), (Samples::F64(vec![1.002, 2.0]), vec![]));
-        let (samples, odd) = labels(Samples::F64(vec![f64::NAN, 2.0]));
+        let (samples, odd) = labels(Samples::F64(vec![1.002, 2.0].into()));
+        assert_eq!((samples, odd), (Samples::F64(vec![1.002, 2.0].into()), vec![]));
+        let (samples, odd) = labels(Samples::F64(vec![f64::NAN, 2.0].into()));
         assert!(samples.get(0).is_nan() && odd.is_empty());
     }
 

@@ -219,7 +219,7 @@ impl<const D: usize> Page<'_, D> {
         let image = match &self.against.image {
             Some(image) => image,
             None => {
-                let samples = Samples::F32(self.against.potential.clone());
+                let samples = Samples::F32(self.against.potential.clone().into());
                 potential = Image::new(self.against.frame, samples).map_err(JobError::content)?;
                 &potential
             }

@@ -31,7 +31,7 @@ fn image() -> Image<2> {
     let mut grey = vec![200u8; 48 * 40];
     grey[20 * 48..21 * 48].fill(10);
     let frame = Frame::new([48, 40]).unwrap().with_spacing([0.5, 0.5]).unwrap();
-    Image::new(frame, Samples::U8(grey)).unwrap()
+    Image::new(frame, Samples::U8(grey.into())).unwrap()
 }
 
 fn run(size: &str) -> RunConfig {
@@ -104,7 +104,7 @@ fn errors_say_of_what_kind_they_are_without_a_file() {
 fn warnings_are_notes() {
     let mut watch = Phases::default();
     let mut session = Session::new(&mut watch);
-    let flat = Image::new(Frame::new([24, 24]).unwrap(), Samples::U8(vec![7; 576])).unwrap();
+    let flat = Image::new(Frame::new([24, 24]).unwrap(), Samples::U8(vec![7; 576].into())).unwrap();
     let outcome =
         mesh(&run("6"), MeshImages::new(flat), &Dimension::plane(), &mut session).unwrap();
     assert!(outcome.mesh().cell_count() > 10);

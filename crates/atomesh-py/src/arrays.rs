@@ -3,7 +3,7 @@
 use std::any::Any;
 use std::sync::Arc;
 
-use atomesh::image::Samples;
+use atomesh::image::{Samples, Values};
 use numpy::ndarray::ArrayView;
 use numpy::{
     Element, IxDyn, PyArray, PyArrayDyn, PyArrayMethods, PyUntypedArray, PyUntypedArrayMethods,
@@ -88,11 +88,42 @@ pub fn plain<'py>(given: &Bound<'py, PyAny>) -> PyResult<Bound<'py, PyUntypedArr
     Ok(array)
 }
 
-/// The samples of a [`plain`] array.
+/// The memory of an array.
+struct Memory<T: Element> {
+    /// Keeps the memory.
+    _array: Py<PyArrayDyn<T>>,
+    first: *const T,
+    count: usize,
+}
+
+// SAFETY: the memory is only read, and numbers may be read by any thread. That nobody writes to the array while work goes
+// on is the caller's part, which the documentation of `Image` asks for, as of all packages that work on arrays without
+// the interpreter's lock; one who writes anyway gets samples of either time.
+unsafe impl<T: Element + Sync> Send for Memory<T> {}
+// SAFETY: as above.
+unsafe impl<T: Element + Sync> Sync for Memory<T> {}
+
+impl<T: Element> AsRef<[T]> for Memory<T> {
+    fn as_ref(&self) -> &[T] {
+        // SAFETY: `first` and `count` are those of a contiguous array, which the reference to it keeps; NumPy does not
+        // move an array's memory, and refuses to resize an array that others refer to.
+        unsafe { std::slice::from_raw_parts(self.first, self.count) }
+    }
+}
+
+/// The samples of a [`plain`] array, without a copy.
 pub fn samples(array: &Bound<'_, PyUntypedArray>) -> PyResult<Samples> {
-    fn values<T: Element + Copy>(array: &Bound<'_, PyUntypedArray>) -> PyResult<Vec<T>> {
+    fn values<T: Element + Sync + 'static>(
+        array: &Bound<'_, PyUntypedArray>,
+    ) -> PyResult<Values<T>> {
         let array = array.cast::<PyArrayDyn<T>>()?;
-        Ok(array.readonly().as_slice()?.to_vec())
+        let (first, count) = {
+            let readonly = array.readonly();
+            let slice = readonly.as_slice()?;
+            (slice.as_ptr(), slice.len())
+        };
+        let memory = Memory { _array: array.clone().unbind(), first, count };
+        Ok(Values::elsewhere(Arc::new(memory)))
     }
     let name: String = array.dtype().getattr("name")?.extract()?;
     Ok(match name.as_str() {
@@ -119,7 +150,7 @@ pub fn of_samples<'py, O: Any + Send + Sync>(
         ($($kind:ident),*) => {
             match part(owner) {
                 $(Samples::$kind(_) => view(py, owner, |owner| match part(owner) {
-                    Samples::$kind(values) => values.as_slice(),
+                    Samples::$kind(values) => &values[..],
                     _ => unreachable!("the samples are of one type"),
                 }, &shape)?.into_any(),)*
                 _ => return Err(PyTypeError::new_err("samples of an unknown type")),

@@ -6,7 +6,9 @@ use std::sync::Arc;
 use atomesh::watch::Phase;
 use atomesh_draw::PictureFormat;
 use atomesh_io::mesh::OwnedField;
-use atomesh_job::flow::{FlowAnswer, FlowMesh, FlowOptions, FlowOutputOptions, flow_on};
+use atomesh_job::flow::{
+    FlowAnswer, FlowMesh, FlowOptions, FlowOutputOptions, FlowPictureOptions, flow_on,
+};
 use atomesh_job::mesh::refusal;
 use atomesh_job::options::FrameOptions;
 use atomesh_job::sample::Property;
@@ -218,6 +220,7 @@ pub trait FlowBody: Send + Sync {
         &self,
         shows_pressure: bool,
         lines: usize,
+        max_side: f64,
         session: &mut Session<'_>,
     ) -> Result<Vec<u8>, JobError>;
 }
@@ -320,6 +323,7 @@ impl<const D: usize> FlowBody for Answer<D> {
         &self,
         shows_pressure: bool,
         lines: usize,
+        max_side: f64,
         session: &mut Session<'_>,
     ) -> Result<Vec<u8>, JobError> {
         let traced = match lines {
@@ -327,7 +331,8 @@ impl<const D: usize> FlowBody for Answer<D> {
             count => self.answer.streamlines(count, &self.dimension.flow, session)?,
         };
         session.begin(Phase::Draw);
-        let picture = self.answer.picture(shows_pressure, &traced, &self.dimension)?;
+        let shown = FlowPictureOptions { shows_pressure, lines: &traced, max_side };
+        let picture = self.answer.picture(&shown, &self.dimension)?;
         picture.encode(PictureFormat::Png).map_err(JobError::content)
     }
 }
@@ -470,17 +475,20 @@ impl Flow {
     ///     "image" (default) or "pressure".
     /// streamlines : int
     ///     How many streamlines are drawn. Default 0.
+    /// max_side : float
+    ///     The longest side in pixels. Default 1600.
     ///
     /// Returns
     /// -------
     /// bytes
     ///     A PNG.
-    #[pyo3(signature = (of = "image", *, streamlines = 0))]
+    #[pyo3(signature = (of = "image", *, streamlines = 0, max_side = 1600.0))]
     fn picture<'py>(
         &self,
         py: Python<'py>,
         of: &str,
         streamlines: usize,
+        max_side: f64,
     ) -> PyResult<Bound<'py, PyBytes>> {
         let shows_pressure = match of {
             "image" => false,
@@ -492,7 +500,7 @@ impl Flow {
         };
         let shared = Arc::clone(&self.shared);
         let (bytes, _) = work(py, &Default::default(), move |session| {
-            shared.0.picture(shows_pressure, streamlines, session)
+            shared.0.picture(shows_pressure, streamlines, max_side, session)
         })?;
         Ok(PyBytes::new(py, &bytes))
     }

@@ -22,7 +22,8 @@ use crate::work::work;
 /// ----------
 /// array : array_like, shape (ny, nx) or (nz, ny, nx)
 ///     The samples, x last. Arrays that are C-contiguous and of type uint8, int8, uint16, int16, uint32, int32, float32
-///     or float64 are taken as they are; others are converted: bool to uint8, float16 to float32, wider ones to float64.
+///     or float64 are taken without a copy: do not change them while work goes on. Others are converted: bool to uint8,
+///     float16 to float32, wider ones to float64.
 ///     NaN marks samples without data; `fill=` of `mesh` says what stands for them where a value is needed.
 /// spacing : sequence of float, optional
 ///     World units from one sample to the next along x, y (and z). Default 1.
@@ -503,7 +504,7 @@ pub fn size_field(
             let given = Wishes::given(fields, &dimension)?;
             let images = MeshImages::with_fields(&run, image.clone(), given, &dimension, session)?;
             let (prepared, image) = prepare(&run, images, &dimension, session)?;
-            let values = Samples::F32(prepared.distance_at_samples());
+            let values = Samples::F32(prepared.distance_at_samples().into());
             Ok(AnyImage::Flat(image.with_samples(values)))
         }
         AnyImage::Volume(image) => {
@@ -511,7 +512,7 @@ pub fn size_field(
             let given = Wishes::given(fields, &dimension)?;
             let images = MeshImages::with_fields(&run, image.clone(), given, &dimension, session)?;
             let (prepared, image) = prepare(&run, images, &dimension, session)?;
-            let values = Samples::F32(prepared.distance_at_samples());
+            let values = Samples::F32(prepared.distance_at_samples().into());
             Ok(AnyImage::Volume(image.with_samples(values)))
         }
     })?;

@@ -36,10 +36,10 @@ fn image_work(criterion: &mut Criterion) {
     });
     group.throughput(Throughput::Elements((SIDE * SIDE * SIDE) as u64));
 
-    let single = Samples::F32(values);
+    let single = Samples::F32(values.into());
     group.bench_function("range_f32", |b| b.iter(|| single.range()));
 
-    let samples = Samples::U8(layers());
+    let samples = Samples::U8(layers().into());
     let grid = Grid { shape: SHAPE, step: [1.0; 3] };
     group.bench_function("gradient_gaussian", |b| {
         b.iter(|| gradient_magnitude(&samples, &grid, 1.5));

@@ -68,7 +68,7 @@ fn measures(criterion: &mut Criterion) {
     });
 
     let Ok(frame) = Frame::new([side; 3]) else { return };
-    let image = Samples::F32(potential);
+    let image = Samples::F32(potential.into());
     group.bench_function("sample", |b| {
         let options = SampleOptions::new(&[Statistic::Mean, Statistic::Total]);
         b.iter(|| sample_in_frame(&mesh, &frame, &image, options, &mut Silent));

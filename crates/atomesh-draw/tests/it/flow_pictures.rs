@@ -45,7 +45,7 @@ fn polygons() -> PolyMesh<2> {
 }
 
 fn grey<const D: usize>(shape: [usize; D]) -> Image<D> {
-    let samples = Samples::U8(vec![7; shape.iter().product()]);
+    let samples = Samples::U8(vec![7; shape.iter().product()].into());
     Image::new(Frame::new(shape).unwrap(), samples).unwrap()
 }
 

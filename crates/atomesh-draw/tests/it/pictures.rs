@@ -80,7 +80,7 @@ fn edges_run_between_the_centres_of_samples() {
 #[test]
 fn an_edge_has_the_wanted_length_in_true_proportions() {
     let frame = Frame::new([30, 20]).unwrap().with_spacing([0.5, 2.0]).unwrap();
-    let image = Image::new(frame, Samples::F32(vec![0.0; 600])).unwrap();
+    let image = Image::new(frame, Samples::F32(vec![0.0; 600].into())).unwrap();
     // cells two samples wide along x, one millimetre: the median edge is 1 mm
     let points = vec![[0.0, 0.0], [2.0, 0.0], [0.0, 0.5], [4.0, 0.0]];
     let mesh = Mesh::new(points, vec![0, 1, 2]).unwrap();
@@ -95,13 +95,13 @@ fn an_edge_has_the_wanted_length_in_true_proportions() {
 fn outliers_and_missing_samples_leave_the_greys_as_they_are() {
     let mut samples: Vec<f32> = (0..1000).map(|i| (i % 10) as f32).collect();
     (samples[3], samples[500], samples[999]) = (f32::NAN, 1e30, f32::NEG_INFINITY);
-    let image = Image::new(Frame::new([100, 10]).unwrap(), Samples::F32(samples)).unwrap();
+    let image = Image::new(Frame::new([100, 10]).unwrap(), Samples::F32(samples.into())).unwrap();
     let style = Style { max_side: 100.0, brightness: 1.0, ..Style::default() };
     let pixels = Pixels::of(&draw_triangles(&image, &empty(), &style).unwrap());
     assert_eq!(pixels.at(0.5, 0.5), [0; 3]);
     assert_eq!(pixels.at(9.5, 0.5), [255; 3]);
     assert_eq!(pixels.at(3.5, 0.5), [0; 3]); // not a number
-    let flat = Image::new(Frame::new([4, 4]).unwrap(), Samples::U8(vec![7; 16])).unwrap();
+    let flat = Image::new(Frame::new([4, 4]).unwrap(), Samples::U8(vec![7; 16].into())).unwrap();
     let pixels = Pixels::of(&draw_triangles(&flat, &empty(), &style).unwrap());
     assert_eq!(pixels.at(50.0, 50.0), [128; 3]);
 }
@@ -132,7 +132,7 @@ fn ramp(shape: [usize; 3]) -> Image<3> {
             samples.extend((0..nx).map(|x| (10 * x + 20 * y + 30 * z) as f32));
         }
     }
-    Image::new(Frame::new(shape).unwrap(), Samples::F32(samples)).unwrap()
+    Image::new(Frame::new(shape).unwrap(), Samples::F32(samples.into())).unwrap()
 }
 
 /// One cell that is cut by all planes through its middle.
@@ -233,7 +233,7 @@ fn the_view_in_space_shows_what_is_nearest() {
             _ => 0.0,
         };
     }
-    let image = Image::new(Frame::new([9; 3]).unwrap(), Samples::F32(samples)).unwrap();
+    let image = Image::new(Frame::new([9; 3]).unwrap(), Samples::F32(samples.into())).unwrap();
     let grey = |value: f64| [(value / 90.0 * 0.85 * 255.0).round() as u8; 3];
     for z_up in [false, true] {
         let style = Style { z_up, max_side: 400.0, ..Style::default() };
@@ -286,7 +286,7 @@ proptest! {
         sample in prop::num::f32::ANY,
     ) {
         let count = shape.iter().product();
-        let image = Image::new(Frame::new(shape).unwrap(), Samples::F32(vec![sample; count])).unwrap();
+        let image = Image::new(Frame::new(shape).unwrap(), Samples::F32(vec![sample; count].into())).unwrap();
         let corners = corners[..corners.len() / 4 * 4].to_vec();
         let mesh = Mesh::new(points, corners).unwrap();
         let style = Style { atoms: true, max_side: 300.0, ..Style::default() };

@@ -32,7 +32,7 @@ macro_rules! channels {
                 mean as $number // a mean is no greater than the greatest value in it
             }
             fn samples(values: Vec<Self>) -> Samples {
-                Samples::$kind(values)
+                Samples::$kind(values.into())
             }
         })*
     };
@@ -93,7 +93,7 @@ impl Values {
                 Ok(T::samples(first(interleaved, channels)))
             }
             Meaning::LabelsByColour if is_colour => {
-                Ok(Samples::U32(self.colours.numbers(&interleaved, channels)))
+                Ok(Samples::U32(self.colours.numbers(&interleaved, channels).into()))
             }
             Meaning::Mask if is_colour => Ok(T::samples(greatest(interleaved, channels))),
             _ => Ok(T::samples(grey(interleaved, channels))),
@@ -287,7 +287,7 @@ mod tests {
         let (samples, notes) = values(Meaning::Labels, vec![3, 3, 3, 7, 7, 7]).unwrap();
         assert_eq!(
             (samples, &notes[..]),
-            (Samples::U8(vec![3, 7]), &[ReadNote::EqualChannels][..])
+            (Samples::U8(vec![3, 7].into()), &[ReadNote::EqualChannels][..])
         );
         let text = values(Meaning::Labels, vec![3, 3, 3, 7, 7, 8]).unwrap_err().to_string();
         assert!(text.contains("PNG file holds colours"), "{text}");
@@ -297,11 +297,11 @@ mod tests {
     fn labels_by_colour_ascend_with_black_as_0() {
         let rgb = vec![255, 0, 0, 0, 130, 0, 0, 0, 255, 0, 130, 0];
         let (samples, notes) = values(Meaning::LabelsByColour, rgb.clone()).unwrap();
-        assert_eq!(samples, Samples::U32(vec![3, 2, 1, 2]));
+        assert_eq!(samples, Samples::U32(vec![3, 2, 1, 2].into()));
         assert_eq!(notes[0].to_string(), "labels by colour: 1 #0000ff, 2 #008200, 3 #ff0000");
         let with_black = [rgb, vec![0, 0, 0]].concat();
         let (samples, _) = values(Meaning::LabelsByColour, with_black).unwrap();
-        assert_eq!(samples, Samples::U32(vec![3, 2, 1, 2, 0]));
+        assert_eq!(samples, Samples::U32(vec![3, 2, 1, 2, 0].into()));
     }
 
     #[test]
@@ -315,7 +315,7 @@ mod tests {
     #[test]
     fn the_darkest_colour_is_inside_of_a_mask() {
         let (samples, _) = values(Meaning::Mask, vec![0, 0, 1, 0, 0, 0]).unwrap();
-        assert_eq!(samples, Samples::U8(vec![1, 0]));
+        assert_eq!(samples, Samples::U8(vec![1, 0].into()));
     }
 
     #[test]

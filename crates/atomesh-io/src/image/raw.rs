@@ -89,11 +89,11 @@ mod tests {
         let big =
             RawLayout { byte_order: ByteOrder::Big, offset: 3, ..layout(&[2, 2], SampleType::U16) };
         let image = decode(&bytes, big).unwrap();
-        assert_eq!(*image.samples(), Samples::U16(vec![1, 2, 256, 65535]));
+        assert_eq!(*image.samples(), Samples::U16(vec![1, 2, 256, 65535].into()));
         assert_eq!(image.shape(), [2, 2]);
 
         let wide = decode(&(-7i64).to_le_bytes(), layout(&[1, 1, 1], SampleType::I64)).unwrap();
-        assert_eq!(*wide.samples(), Samples::F64(vec![-7.0]));
+        assert_eq!(*wide.samples(), Samples::F64(vec![-7.0].into()));
         assert_eq!(wide.dimension(), 3);
     }
 

@@ -168,7 +168,7 @@ mod tests {
 
     #[test]
     fn types_of_samples_are_found() {
-        let spelling = Spelling::of_samples(&Samples::I16(vec![1])).unwrap();
+        let spelling = Spelling::of_samples(&Samples::I16(vec![1].into())).unwrap();
         assert_eq!((spelling.nrrd[0], spelling.vtk[0], spelling.nifti), ("int16", "Int16", 4));
     }
 }

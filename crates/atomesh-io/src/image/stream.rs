@@ -43,17 +43,20 @@ pub(super) fn read_samples(reader: &mut dyn Read, layout: &Layout) -> Result<Sam
     macro_rules! read_as {
         ($kind:ident, $number:ident, $held:ident) => {
             match layout.scale {
-                None => {
-                    Samples::$kind(collect(reader, layout, |b| $number::from_le_bytes(b) as $held)?)
-                }
-                Some((slope, intercept)) => Samples::F32(collect(reader, layout, |b| {
-                    ($number::from_le_bytes(b) as f64 * slope + intercept) as f32
-                })?),
+                None => Samples::$kind(
+                    collect(reader, layout, |b| $number::from_le_bytes(b) as $held)?.into(),
+                ),
+                Some((slope, intercept)) => Samples::F32(
+                    collect(reader, layout, |b| {
+                        ($number::from_le_bytes(b) as f64 * slope + intercept) as f32
+                    })?
+                    .into(),
+                ),
             }
         };
     }
     Ok(match layout.sample_type {
-        SampleType::Bool => Samples::U8(collect(reader, layout, |[b]| u8::from(b != 0))?),
+        SampleType::Bool => Samples::U8(collect(reader, layout, |[b]| u8::from(b != 0))?.into()),
         SampleType::U8 => read_as!(U8, u8, u8),
         SampleType::I8 => read_as!(I8, i8, i8),
         SampleType::U16 => read_as!(U16, u16, u16),
@@ -63,7 +66,7 @@ pub(super) fn read_samples(reader: &mut dyn Read, layout: &Layout) -> Result<Sam
         SampleType::U64 => read_as!(F64, u64, f64),
         SampleType::I64 => read_as!(F64, i64, f64),
         SampleType::F16 => {
-            Samples::F32(collect(reader, layout, |b| half_to_single(u16::from_le_bytes(b)))?)
+            Samples::F32(collect(reader, layout, |b| half_to_single(u16::from_le_bytes(b)))?.into())
         }
         SampleType::F32 => read_as!(F32, f32, f32),
         SampleType::F64 => read_as!(F64, f64, f64),
@@ -273,7 +276,7 @@ mod tests {
             ..layout(SampleType::U32, count)
         };
         let read = read_samples(&mut &turned[..], &from_turned).unwrap();
-        assert_eq!(read, Samples::U32(straight.clone()));
+        assert_eq!(read, Samples::U32(straight.clone().into()));
 
         let bytes: Vec<u8> = straight.iter().flat_map(|n| n.to_le_bytes()).collect();
         let growing = Layout { reserve: 1, ..layout(SampleType::U32, count) };

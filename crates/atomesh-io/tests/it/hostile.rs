@@ -114,11 +114,12 @@ fn samples_are_not_read_into_more_memory_than_there_is() {
     let folder = tempfile::tempdir().unwrap();
     let at = |name: &str| folder.path().join(name);
     let frame = Frame::new([32, 32, 4]).unwrap();
-    let volume = Image::new(frame, Samples::U16(vec![7; 4096])).unwrap();
+    let volume = Image::new(frame, Samples::U16(vec![7; 4096].into())).unwrap();
     for name in ["v.npy", "v.nii", "v.nii.gz", "v.nrrd", "v.vti", "v.tif"] {
         write_image(&at(name), &volume, &mut Silent).unwrap();
     }
-    let flat = Image::new(Frame::new([128, 64]).unwrap(), Samples::U8(vec![7; 8192])).unwrap();
+    let flat =
+        Image::new(Frame::new([128, 64]).unwrap(), Samples::U8(vec![7; 8192].into())).unwrap();
     write_image(&at("f.png"), &flat, &mut Silent).unwrap();
     let head = b"P5 128 64 255\n".to_vec();
     fs::write(at("f.pgm"), [head, vec![7; 8192]].concat()).unwrap();

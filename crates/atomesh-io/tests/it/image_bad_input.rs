@@ -172,7 +172,7 @@ fn cut_files_are_refused_wherever_they_end() {
 
 #[test]
 fn nan_is_kept_and_counted() {
-    let samples = Samples::F32(vec![1.0, f32::NAN, f32::INFINITY, -2.0]);
+    let samples = Samples::F32(vec![1.0, f32::NAN, f32::INFINITY, -2.0].into());
     let image = Image::new(Frame::new([2, 2, 1]).unwrap(), samples).unwrap();
     let folder = tempfile::tempdir().unwrap();
     for name in ["v.npy", "v.nii", "v.nii.gz", "v.nrrd"] {
@@ -192,7 +192,7 @@ fn rows_columns_and_constant_images_are_read() {
     for (nx, ny) in [(1, 1), (1, 40), (40, 1)] {
         for name in ["f.npy", "f.nii", "f.nii.gz", "f.nrrd", "f.vti", "f.tif", "f.png"] {
             let path = folder.path().join(name);
-            let samples = Samples::U8(vec![7; nx * ny]);
+            let samples = Samples::U8(vec![7; nx * ny].into());
             let image = Image::new(Frame::new([nx, ny]).unwrap(), samples.clone()).unwrap();
             write_image(&path, &image, &mut Silent).unwrap();
             let back = read(&path).unwrap();
@@ -200,7 +200,8 @@ fn rows_columns_and_constant_images_are_read() {
         }
     }
     // far more samples than bytes, as constant images compress
-    let wide = Image::new(Frame::new([2000, 1000]).unwrap(), Samples::U8(vec![7; 2_000_000]));
+    let wide =
+        Image::new(Frame::new([2000, 1000]).unwrap(), Samples::U8(vec![7; 2_000_000].into()));
     for name in ["f.nii.gz", "f.nrrd", "f.vti", "f.png"] {
         let path = folder.path().join(name);
         write_image(&path, wide.as_ref().unwrap(), &mut Silent).unwrap();
@@ -221,17 +222,19 @@ fn places_and_types_that_cannot_be_written_are_refused() {
         assert!(error.to_string().contains("directory"), "{error}");
     }
     let path = folder.path().join("f.png");
-    let floats = Image::new(Frame::new([1, 1]).unwrap(), Samples::F32(vec![-0.5])).unwrap();
+    let floats = Image::new(Frame::new([1, 1]).unwrap(), Samples::F32(vec![-0.5].into())).unwrap();
     let error = write_image(&path, &floats, &mut Silent).unwrap_err();
     assert!(error.to_string().contains("float32") && error.to_string().contains(".npy"), "{error}");
-    let volume = Image::new(Frame::new([1, 1, 2]).unwrap(), Samples::U8(vec![0; 2])).unwrap();
+    let volume =
+        Image::new(Frame::new([1, 1, 2]).unwrap(), Samples::U8(vec![0; 2].into())).unwrap();
     let error = write_image(&path, &volume, &mut Silent).unwrap_err();
     assert!(matches!(error.reason, WriteReason::Shape { .. }), "{error}");
-    let long = Image::new(Frame::new([40_000, 1]).unwrap(), Samples::U8(vec![0; 40_000])).unwrap();
+    let long =
+        Image::new(Frame::new([40_000, 1]).unwrap(), Samples::U8(vec![0; 40_000].into())).unwrap();
     let error = write_image(&folder.path().join("f.nii"), &long, &mut Silent).unwrap_err();
     assert!(error.to_string().contains("32767"), "{error}");
     let fine = Frame::new([1, 1]).unwrap().with_spacing([1e-60, 1.0]).unwrap();
-    let fine = Image::new(fine, Samples::U8(vec![0])).unwrap();
+    let fine = Image::new(fine, Samples::U8(vec![0].into())).unwrap();
     let error = write_image(&folder.path().join("f.nii"), &fine, &mut Silent).unwrap_err();
     assert!(error.to_string().contains("spacing"), "{error}");
     let entries = std::fs::read_dir(folder.path()).unwrap();

@@ -230,7 +230,7 @@ proptest! {
     ) {
         let count = nx * ny * nz;
         let values: Vec<f64> = bits[..count].iter().map(|&b| f64::from_bits(b)).collect();
-        let image = Image::new(Frame::new([nx, ny, nz]).unwrap(), Samples::F64(values)).unwrap();
+        let image = Image::new(Frame::new([nx, ny, nz]).unwrap(), Samples::F64(values.into())).unwrap();
         let folder = tempfile::tempdir().unwrap();
         let layout = RawLayout {
             shape: vec![nx, ny, nz],

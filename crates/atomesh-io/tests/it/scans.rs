@@ -56,7 +56,7 @@ fn message(bytes: &[u8], format: ImageFormat) -> String {
 /// Checks samples, and the places of all corners after the signs of the file's world are changed.
 fn check(image: &AnyImage, signs: [f64; 3], what: &str) {
     let AnyImage::Volume(volume) = image else { panic!("{what} is flat") };
-    assert_eq!(*volume.samples(), Samples::I16(values()), "{what}");
+    assert_eq!(*volume.samples(), Samples::I16(values().into()), "{what}");
     for corner in 0..8 {
         let index: [usize; 3] = std::array::from_fn(|k| (corner >> k & 1) * (SHAPE[k] - 1));
         let place = volume.frame().lattice_to_world(Units::Samples, &index.map(|i| i as f64));
@@ -267,7 +267,7 @@ fn a_scan_lies_in_the_same_place_whatever_file_it_comes_in() {
     let direction = std::array::from_fn(|r| std::array::from_fn(|c| columns[c][r]));
     let frame = Frame::new(SHAPE).unwrap().with_spacing(SPACING).unwrap();
     let frame = frame.with_origin(turn(ORIGIN)).unwrap().with_direction(direction).unwrap();
-    let image = Image::new(frame, Samples::I16(values())).unwrap();
+    let image = Image::new(frame, Samples::I16(values().into())).unwrap();
     let folder = tempfile::tempdir().unwrap();
     for name in ["scan.nii", "scan.nii.gz", "scan.nrrd", "scan.vti"] {
         let path = folder.path().join(name);
@@ -345,7 +345,7 @@ fn values_in_vtk_cells_sit_in_their_middles() {
     let points = file("1 2 0 1 5 5", "PointData", "1 2 3 4");
     let points = decode(points.as_bytes(), ImageFormat::VTI).unwrap();
     assert_eq!((points.shape(), points.origin()), (vec![2, 2], vec![12.0, 20.0]));
-    assert_eq!(*points.samples(), Samples::U8(vec![1, 2, 3, 4]));
+    assert_eq!(*points.samples(), Samples::U8(vec![1, 2, 3, 4].into()));
 }
 
 #[test]
@@ -710,7 +710,7 @@ fn what_the_caller_gives_need_not_be_in_the_slices() {
     let text = load(unspaced.path(), nothing).unwrap_err().to_string();
     assert!(text.contains("no pixel spacing"), "{text}");
     let loaded = load(unspaced.path(), spacing).unwrap();
-    assert_eq!(*loaded.image.samples(), Samples::I16(values()));
+    assert_eq!(*loaded.image.samples(), Samples::I16(values().into()));
     assert!(loaded.units.is_empty(), "the caller's unit is not known");
 
     // files are named against their order, and numbered in it
@@ -721,7 +721,7 @@ fn what_the_caller_gives_need_not_be_in_the_slices() {
     let text = load(unplaced.path(), nothing).unwrap_err().to_string();
     assert!(text.contains("no image position"), "{text}");
     let loaded = load(unplaced.path(), spacing).unwrap();
-    assert_eq!(*loaded.image.samples(), Samples::I16(values()));
+    assert_eq!(*loaded.image.samples(), Samples::I16(values().into()));
     let note = ReadNote::ByNumber { numbers: "instance numbers" };
     assert!(loaded.notes.contains(&note) && note.is_warning(), "{:?}", loaded.notes);
     let twice = series(|k, slice| {
@@ -734,7 +734,10 @@ fn what_the_caller_gives_need_not_be_in_the_slices() {
     let unturned = series(|_, slice| slice.has.axes = false);
     assert!(load(unturned.path(), spacing).is_err());
     let both = GivenFrame { direction: true, ..spacing };
-    assert_eq!(*load(unturned.path(), both).unwrap().image.samples(), Samples::I16(values()));
+    assert_eq!(
+        *load(unturned.path(), both).unwrap().image.samples(),
+        Samples::I16(values().into())
+    );
 }
 
 #[test]
@@ -772,5 +775,5 @@ fn axes_that_are_sheared_are_read_where_the_caller_gives_others() {
     let given = GivenFrame { direction: true, ..GivenFrame::default() };
     let options = ReadOptions { given, ..ReadOptions::default() };
     let image = decode_image(&bytes, ImageFormat::NRRD, &options, &mut Silent).unwrap();
-    assert_eq!(*image.samples(), Samples::I16(values()));
+    assert_eq!(*image.samples(), Samples::I16(values().into()));
 }

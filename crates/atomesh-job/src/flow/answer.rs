@@ -10,7 +10,7 @@ use super::files::FlowFiles;
 use super::flow_mesh::{FlowMesh, FlowMeshCells};
 use super::leak::Leak;
 use super::options::FlowOutputOptions;
-use super::picture::FlowDrawing;
+use super::picture::{FlowDrawing, FlowPictureOptions};
 use super::write::FlowWriting;
 use crate::dimension::Dimension;
 use crate::error::JobError;
@@ -96,18 +96,17 @@ impl<const D: usize> FlowAnswer<D> {
         Ok((method.trace)(&self.grid, &setting, &self.solution, &options, session)?)
     }
 
-    /// A picture of the flow over the image, or over the pressures; `lines` are drawn too.
+    /// A picture of the flow.
     ///
     /// # Errors
     /// [`JobError`] if it cannot be drawn.
     pub fn picture(
         &self,
-        shows_pressure: bool,
-        lines: &[Streamline<D>],
+        shown: &FlowPictureOptions<'_, D>,
         dimension: &Dimension<D>,
     ) -> Result<Picture, JobError> {
         let setting = &self.setting(&dimension.flow);
-        FlowDrawing { answer: self, setting, shows_pressure, lines }.picture(dimension)
+        FlowDrawing { answer: self, setting, shown }.picture(dimension)
     }
 
     /// Everything in numbers.

@@ -19,6 +19,7 @@ pub use expect::{FlowExpectation, expect};
 pub use flow_mesh::{FlowMesh, FlowMeshCells};
 pub use leak::Leak;
 pub use options::{FlowOptions, FlowOutputOptions};
+pub use picture::FlowPictureOptions;
 
 use std::path::PathBuf;
 

@@ -13,13 +13,28 @@ use super::flow_mesh::{FlowMesh, FlowMeshCells};
 use crate::dimension::Dimension;
 use crate::error::JobError;
 
-/// What is drawn of an answer.
+/// What a picture shows of an answer.
+#[derive(Clone, Copy, Debug)]
+pub struct FlowPictureOptions<'a, const D: usize> {
+    /// Whether pressures are shown behind the mesh, in place of the image.
+    pub shows_pressure: bool,
+    /// Streamlines that are drawn too.
+    pub lines: &'a [Streamline<D>],
+    /// The longest side in pixels.
+    pub max_side: f64,
+}
+
+impl<const D: usize> Default for FlowPictureOptions<'_, D> {
+    fn default() -> Self {
+        Self { shows_pressure: false, lines: &[], max_side: Style::default().max_side }
+    }
+}
+
+/// An answer to be drawn.
 pub(super) struct FlowDrawing<'a, const D: usize> {
     pub answer: &'a FlowAnswer<D>,
     pub setting: &'a Setting<'a, D>,
-    /// Whether pressures are shown behind the mesh, in place of the image.
-    pub shows_pressure: bool,
-    pub lines: &'a [Streamline<D>],
+    pub shown: &'a FlowPictureOptions<'a, D>,
 }
 
 impl<const D: usize> FlowDrawing<'_, D> {
@@ -28,7 +43,8 @@ impl<const D: usize> FlowDrawing<'_, D> {
     /// # Errors
     /// [`JobError`] if it cannot be drawn.
     pub fn picture(&self, dimension: &Dimension<D>) -> Result<Picture, JobError> {
-        let Self { answer, setting, lines, .. } = *self;
+        let Self { answer, setting, shown } = *self;
+        let FlowPictureOptions { shows_pressure, lines, max_side } = *shown;
         let mesh = &answer.mesh;
         let shape = Shape::new(mesh);
         let turn = |v: &Point<D>| turned(mesh, v);
@@ -46,9 +62,9 @@ impl<const D: usize> FlowDrawing<'_, D> {
         let lines: Vec<FlowLine<'_, D>> = (lines.iter().zip(&ways))
             .map(|(line, points)| FlowLine { points, times: &line.times })
             .collect();
-        let pressures = if self.shows_pressure { self.shown_pressures() } else { Vec::new() };
+        let pressures = if shows_pressure { self.shown_pressures() } else { Vec::new() };
         let picture = FlowPicture {
-            image: mesh.image.as_ref().filter(|_| !self.shows_pressure),
+            image: mesh.image.as_ref().filter(|_| !shows_pressure),
             barriers: &barriers,
             velocities: &velocities,
             pressures: &pressures,
@@ -56,7 +72,7 @@ impl<const D: usize> FlowDrawing<'_, D> {
             lines: &lines,
             ..FlowPicture::new(shape.cells())
         };
-        let style = Style { units: mesh.units, z_up: mesh.z_up, ..Style::default() };
+        let style = Style { units: mesh.units, z_up: mesh.z_up, max_side, ..Style::default() };
         (dimension.drawing.flow)(&picture, &style, &FlowStyle::default()).map_err(JobError::content)
     }
 

@@ -16,6 +16,7 @@ use atomesh_io::mesh::{
 use super::answer::FlowAnswer;
 use super::files::FlowFiles;
 use super::flow_mesh::FlowMeshCells;
+use super::picture::FlowPictureOptions;
 use crate::dimension::Dimension;
 use crate::error::JobError;
 use crate::files::{PictureFile, write_bytes};
@@ -84,7 +85,9 @@ impl<'a, const D: usize> FlowWriting<'a, D> {
     ) -> Result<(), JobError> {
         session.begin(Phase::Draw);
         let lines = if self.files.shows_streamlines { lines } else { &[] };
-        file.write(&self.answer.picture(self.files.shows_pressure, lines, self.dimension)?)
+        let shows_pressure = self.files.shows_pressure;
+        let shown = FlowPictureOptions { shows_pressure, lines, ..Default::default() };
+        file.write(&self.answer.picture(&shown, self.dimension)?)
     }
 
     /// Writes the mesh with what is known of its cells.

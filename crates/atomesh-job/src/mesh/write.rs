@@ -88,12 +88,12 @@ impl<const D: usize> Writing<'_, D> {
             Backdrop::Distance => self.outcome.distance_at_samples(),
             Backdrop::Density => self.outcome.feature_density(),
         };
-        let image = Image::new(*self.outcome.frame(), Samples::F32(values));
+        let image = Image::new(*self.outcome.frame(), Samples::F32(values.into()));
         image.map(Some).map_err(JobError::content)
     }
 
     fn write_potential(&self, path: &Path, session: &mut Session<'_>) -> Result<(), JobError> {
-        let samples = Samples::F32(self.outcome.potential().samples().to_vec());
+        let samples = Samples::F32(self.outcome.potential().samples().to_vec().into());
         let image = Image::new(*self.outcome.frame(), samples).map_err(JobError::content)?;
         Ok((self.dimension.files.image)(path, &image, session)?)
     }

@@ -43,5 +43,4 @@ def flow_html(flow):
     """A flow with its picture."""
     balance = flow.balance
     rows = [(name, f"{balance[name]:.6g}") for name in ("wells_in", "wells_out", "boundary_in", "boundary_out", "error")]
-    png = flow.picture()
-    return _figure(png if len(png) <= _LARGEST else None, rows)
+    return _figure(_small(lambda side: flow.picture(max_side=side)), rows)

@@ -213,7 +213,7 @@ mod tests {
         let mut grey = vec![100u8; 32 * 32];
         grey[8 * 32..9 * 32].fill(0); // a dark row
         (0..32).for_each(|y| grey[y * 32 + 20] = 200); // a bright column
-        let image = Image::new(Frame::new([32, 32]).unwrap(), Samples::U8(grey)).unwrap();
+        let image = Image::new(Frame::new([32, 32]).unwrap(), Samples::U8(grey.into())).unwrap();
         for repel in [false, true] {
             let options = FeatureOptions { repel, smooth: Some(0.0), ..Default::default() };
             let mixture = "dark,bright:0.5".parse().unwrap();

@@ -27,7 +27,7 @@ fn lines() -> Vec<u8> {
 
 #[test]
 fn dark_features_are_at_minus_one_and_the_background_at_zero() {
-    let b = run(&image([200, 100], Samples::U8(lines())), with(Features::Dark)).values;
+    let b = run(&image([200, 100], Samples::U8(lines().into())), with(Features::Dark)).values;
     for (i, &b) in b.iter().enumerate() {
         // the noise is ±3 of a contrast of 143
         let expected = if i % 40 == 20 { -1.0 } else { 0.0 };
@@ -39,7 +39,7 @@ fn dark_features_are_at_minus_one_and_the_background_at_zero() {
 fn dark_features_are_rounded_off_unless_sharp_ones_are_asked_for() {
     let mut grey = vec![200u8; 41 * 41];
     (0..41).for_each(|y| grey[20 + 41 * y] = 0);
-    let b = run(&image([41, 41], Samples::U8(grey)), FeatureOptions::default()).values;
+    let b = run(&image([41, 41], Samples::U8(grey.into())), FeatureOptions::default()).values;
     // A line of one sample under the sampled Gaussian of σ = 1, cut at 4 σ: its middle weight.
     let weight = |k: f64| f64::exp(-0.5 * k * k);
     let middle = 1.0 / (1.0 + 2.0 * (weight(1.0) + weight(2.0) + weight(3.0) + weight(4.0)));
@@ -50,7 +50,7 @@ fn dark_features_are_rounded_off_unless_sharp_ones_are_asked_for() {
 fn bright_is_dark_of_the_negative() {
     let grey = lines();
     let negative = grey.iter().map(|g| 255 - g).collect();
-    let dark = run(&image([200, 100], Samples::U8(grey)), with(Features::Dark));
+    let dark = run(&image([200, 100], Samples::U8(grey.into())), with(Features::Dark));
     let bright = run(&image([200, 100], Samples::U8(negative)), with(Features::Bright));
     for (d, b) in dark.values.iter().zip(&bright.values) {
         assert!((d - b).abs() < 1e-6);
@@ -87,7 +87,7 @@ fn samples_of_any_type_give_the_same_potential_to_the_last_bit() {
     ];
     for features in [Features::Dark, Features::Bright, Features::Edges] {
         let options = FeatureOptions { features, ..Default::default() };
-        let expected = run(&image([200, 100], Samples::U8(bytes.clone())), options).values;
+        let expected = run(&image([200, 100], Samples::U8(bytes.clone().into())), options).values;
         for samples in &kinds {
             let found = run(&image([200, 100], samples.clone()), options).values;
             assert!(found == expected, "{features:?} {}", samples.type_name());
@@ -99,7 +99,7 @@ fn samples_of_any_type_give_the_same_potential_to_the_last_bit() {
 fn sparse_features_on_a_flat_background_are_found() {
     let mut likelihood = vec![0.0f32; 100 * 100];
     likelihood[5000..5020].fill(0.8);
-    let b = run(&image([100, 100], Samples::F32(likelihood)), with(Features::Bright)).values;
+    let b = run(&image([100, 100], Samples::F32(likelihood.into())), with(Features::Bright)).values;
     assert!(b[5000..5020].iter().all(|&b| b == -1.0));
     assert_eq!(b.iter().filter(|&&b| b == 0.0).count(), 9980);
 }
@@ -130,14 +130,14 @@ fn a_single_edge_in_a_large_image_is_an_edge() {
     let mut grey = vec![0u8; 200 * 200];
     grey[20_100] = 9;
     let options = FeatureOptions { edge_operator: EdgeOperator::Prewitt, ..with(Features::Edges) };
-    let b = run(&image([200, 200], Samples::U8(grey)), options);
+    let b = run(&image([200, 200], Samples::U8(grey.into())), options);
     assert!(!b.constant && b.values[20_099] < -0.6);
 }
 
 #[test]
 fn constant_images_have_no_features_and_say_so() {
     for features in [Features::Dark, Features::Bright, Features::Edges, Features::None] {
-        for samples in [Samples::U8(vec![7; 60]), Samples::F32(vec![-1e30; 60])] {
+        for samples in [Samples::U8(vec![7; 60].into()), Samples::F32(vec![-1e30; 60].into())] {
             let found = run(&image([20, 3], samples), with(features));
             assert!(found.values.iter().all(|&b| b == 0.0));
             assert_eq!(found.constant, features != Features::None);
@@ -148,9 +148,9 @@ fn constant_images_have_no_features_and_say_so() {
 #[test]
 fn images_of_one_sample_or_one_row_are_images() {
     for features in [Features::Dark, Features::Bright, Features::Edges] {
-        assert!(run(&image([1, 1, 1], Samples::I16(vec![-5])), with(features)).constant);
+        assert!(run(&image([1, 1, 1], Samples::I16(vec![-5].into())), with(features)).constant);
         let row: Vec<i32> = (0..50).map(|i| i32::from(i > 30) * 1000).collect();
-        let b = run(&image([1, 50], Samples::I32(row)), with(features)).values;
+        let b = run(&image([1, 50], Samples::I32(row.into())), with(features)).values;
         assert!(b.iter().any(|&b| b < -0.9) && b.iter().any(|&b| b > -0.1), "{b:?}");
     }
 }
@@ -160,7 +160,7 @@ fn smoothing_is_in_lattice_units() {
     let mut grey = vec![200u8; 41 * 41];
     grey[20 * 41 + 20] = 0;
     let frame = Frame::new([41, 41]).unwrap().with_spacing([1.0, 4.0]).unwrap();
-    let image = Image::new(frame, Samples::U8(grey)).unwrap();
+    let image = Image::new(frame, Samples::U8(grey.into())).unwrap();
     let options = FeatureOptions { smooth: Some(4.0), ..Default::default() };
     let physical = run(&image, options).values;
     // a distance of 4 units is one row, or four columns
@@ -171,7 +171,7 @@ fn smoothing_is_in_lattice_units() {
 
 #[test]
 fn repelling_negates() {
-    let image = image([200, 100], Samples::U8(lines()));
+    let image = image([200, 100], Samples::U8(lines().into()));
     let attract = run(&image, with(Features::Dark)).values;
     let repel = run(&image, FeatureOptions { repel: true, ..with(Features::Dark) }).values;
     assert!(attract.iter().zip(&repel).all(|(a, r)| -a == *r && r.is_sign_positive()));
@@ -182,15 +182,18 @@ fn samples_that_are_not_finite_are_counted_and_named() {
     let mut samples = vec![1.0f32; 30];
     samples[7] = f32::INFINITY;
     samples[11] = f32::NAN;
-    let error =
-        enhance(&image([10, 3], Samples::F32(samples)), &FeatureOptions::default(), &mut Silent);
+    let error = enhance(
+        &image([10, 3], Samples::F32(samples.into())),
+        &FeatureOptions::default(),
+        &mut Silent,
+    );
     let value = f64::INFINITY;
     assert_eq!(error, Err(EnhanceError::NotFinite { count: 2, first: 7, value }));
 }
 
 #[test]
 fn bad_options_are_refused() {
-    let image = image([10, 3], Samples::U8(vec![0; 30]));
+    let image = image([10, 3], Samples::U8(vec![0; 30].into()));
     for value in [0.0, 0.29, -1.0, f64::NAN, f64::INFINITY] {
         let options = FeatureOptions { edge_scale: value, ..Default::default() };
         let error = enhance(&image, &options, &mut Silent).unwrap_err();
@@ -213,7 +216,7 @@ fn a_watch_can_end_it() {
             if self.0 == 0 { ControlFlow::Break(()) } else { ControlFlow::Continue(()) }
         }
     }
-    let image = image([200, 100], Samples::U8(lines()));
+    let image = image([200, 100], Samples::U8(lines().into()));
     for steps in 1..=4 {
         let found = enhance(&image, &with(Features::Edges), &mut Impatient(steps));
         assert_eq!(found, Err(EnhanceError::Cancelled(Cancelled)));
@@ -222,11 +225,11 @@ fn a_watch_can_end_it() {
 
 #[test]
 fn given_potentials_are_checked_and_never_rescaled() {
-    let kept = given_potential(Samples::F32(vec![-1.0, 0.25, 1.0])).unwrap();
+    let kept = given_potential(Samples::F32(vec![-1.0, 0.25, 1.0].into())).unwrap();
     assert_eq!(kept, [-1.0, 0.25, 1.0]);
-    let error = given_potential(Samples::U8(vec![1, 0, 255]));
+    let error = given_potential(Samples::U8(vec![1, 0, 255].into()));
     assert_eq!(error, Err(EnhanceError::OutOfRange { index: 2, value: 255.0 }));
-    let error = given_potential(Samples::F64(vec![0.0, f64::NAN]));
+    let error = given_potential(Samples::F64(vec![0.0, f64::NAN].into()));
     assert!(matches!(error, Err(EnhanceError::OutOfRange { index: 1, value }) if value.is_nan()));
 }
 
@@ -279,8 +282,8 @@ fn features_end_where_data_do_and_stay_as_they_are_elsewhere() {
     let absent: Vec<bool> = (0..1600).map(|i| i / 40 < 12).collect();
     let mut cut = grey.clone();
     cut[..12 * 40].fill(255);
-    let whole = image(shape, Samples::U8(grey));
-    let part = image(shape, Samples::U8(cut)).with_absent(absent).unwrap();
+    let whole = image(shape, Samples::U8(grey.into()));
+    let part = image(shape, Samples::U8(cut.into())).with_absent(absent).unwrap();
     for features in [Features::Edges, Features::Dark] {
         let (whole, part) = (run(&whole, with(features)), run(&part, with(features)));
         assert!(part.values[..12 * 40].iter().all(|&b| b == 0.0), "{features:?}");

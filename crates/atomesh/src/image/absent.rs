@@ -227,22 +227,23 @@ mod tests {
     fn what_is_absent_mirrors_what_is_there() {
         let row = |absent: [bool; 6]| {
             let frame = Frame::new([6, 1]).unwrap();
-            let image = Image::new(frame, Samples::U8(vec![1, 2, 3, 4, 5, 6])).unwrap();
+            let image = Image::new(frame, Samples::U8(vec![1, 2, 3, 4, 5, 6].into())).unwrap();
             image.with_absent(absent.to_vec()).unwrap()
         };
         let continued = row([false, false, false, false, true, true]).continued().unwrap();
         // about the last sample there, 4: one beyond is one before
-        assert_eq!(continued.samples(), &Samples::U8(vec![1, 2, 3, 4, 3, 2]));
+        assert_eq!(continued.samples(), &Samples::U8(vec![1, 2, 3, 4, 3, 2].into()));
         assert!(continued.absent().is_none());
         // twice as far as there is data: the share of it that is within
         let continued = row([true, true, true, true, false, false]).continued().unwrap();
-        assert_eq!(continued.samples(), &Samples::U8(vec![6, 6, 6, 6, 5, 6]));
+        assert_eq!(continued.samples(), &Samples::U8(vec![6, 6, 6, 6, 5, 6].into()));
         assert!(row([false; 6]).continued().is_none() && row([true; 6]).continued().is_none());
     }
 
     #[test]
     fn a_flag_for_each_sample_is_needed() {
-        let image = Image::new(Frame::new([2, 2]).unwrap(), Samples::U8(vec![0; 4])).unwrap();
+        let image =
+            Image::new(Frame::new([2, 2]).unwrap(), Samples::U8(vec![0; 4].into())).unwrap();
         let wrong = FrameError::SampleCount { expected: 4, found: 3 };
         assert_eq!(image.with_absent(vec![true; 3]).unwrap_err(), wrong);
     }

@@ -131,7 +131,7 @@ mod tests {
         let grid = Grid { shape: [5, 5], step: [1.0; 2] };
         let mut values = vec![0.0f32; 25];
         values[12] = 6.0;
-        let found = prewitt_magnitude(&Samples::F32(values), &grid);
+        let found = prewitt_magnitude(&Samples::F32(values.into()), &grid);
         let (d, l) = (2f32.sqrt(), 1.0);
         #[rustfmt::skip]
         let expected = [
@@ -150,7 +150,7 @@ mod tests {
         let grid = Grid { shape, step: std::array::from_fn(|k| 1.0 + k as f64) };
         let mut values = noise(grid.sample_count()).to_f32();
         values[blank].fill(0.0);
-        let samples = Samples::F32(values.clone());
+        let samples = Samples::F32(values.clone().into());
         let mut squared = vec![0.0f32; values.len()];
         for k in 0..D {
             let order = std::array::from_fn(|axis| u8::from(axis == k));

@@ -12,6 +12,7 @@ mod resample;
 mod samples;
 mod stream;
 mod tensor;
+mod values;
 
 pub(crate) use cells::{CellAverages, Entries};
 pub use frame::{Frame, FrameError, Grid, Units};
@@ -24,6 +25,7 @@ pub use resample::{Between, SampleOrder};
 pub use samples::{Range, Samples};
 pub(crate) use stream::{Run, Stencil, Stream};
 pub use tensor::StructureTensor;
+pub use values::{Elsewhere, Values};
 
 /// Samples on a regular grid, with the frame that says where they are.
 ///

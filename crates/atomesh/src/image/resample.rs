@@ -248,7 +248,8 @@ mod tests {
 
     #[test]
     fn outside_of_the_image_there_is_what_was_asked_for() {
-        let image = Image::new(Frame::new([3, 3]).unwrap(), Samples::U8(vec![7; 9])).unwrap();
+        let image =
+            Image::new(Frame::new([3, 3]).unwrap(), Samples::U8(vec![7; 9].into())).unwrap();
         let wide = Frame::new([6, 3]).unwrap().with_origin([-1.0, 0.0]).unwrap();
         let (found, outside) = image.resampled(&wide, Between::Nearest);
         assert_eq!(outside, 9); // at x = −1, 3 and 4

@@ -1,30 +1,32 @@
 //! Sample values in the type in which a file holds them.
 
 use rayon::prelude::*;
+
+use super::values::Values;
 use std::ops::Range as IndexRange;
 
-/// Sample values, kept in the type of the file so that a large image is held once.
+/// Sample values, kept in the type of the file so that a large image is held once; clones share their memory.
 ///
 /// 64-bit integers are held as `F64`.
 #[derive(Clone, Debug, PartialEq)]
 #[non_exhaustive]
 pub enum Samples {
     /// Unsigned bytes.
-    U8(Vec<u8>),
+    U8(Values<u8>),
     /// Signed bytes.
-    I8(Vec<i8>),
+    I8(Values<i8>),
     /// Unsigned 16-bit integers.
-    U16(Vec<u16>),
+    U16(Values<u16>),
     /// Signed 16-bit integers.
-    I16(Vec<i16>),
+    I16(Values<i16>),
     /// Unsigned 32-bit integers.
-    U32(Vec<u32>),
+    U32(Values<u32>),
     /// Signed 32-bit integers.
-    I32(Vec<i32>),
+    I32(Values<i32>),
     /// Single precision.
-    F32(Vec<f32>),
+    F32(Values<f32>),
     /// Double precision.
-    F64(Vec<f64>),
+    F64(Values<f64>),
 }
 
 /// The least and greatest finite sample, and how many are not finite.
@@ -167,7 +169,7 @@ impl Samples {
     #[allow(clippy::useless_conversion)] // of f64, one of the types
     pub fn to_f32(&self) -> Vec<f32> {
         match self {
-            Samples::F32(v) => v.clone(),
+            Samples::F32(v) => v.to_vec(),
             _ => each!(self, v => v.par_iter().map(|&s| f64::from(s) as f32).collect()),
         }
     }
@@ -175,7 +177,7 @@ impl Samples {
     /// The same in single precision, without a copy if they already are.
     pub fn into_f32(self) -> Vec<f32> {
         match self {
-            Samples::F32(v) => v,
+            Samples::F32(v) => v.into_vec(),
             other => other.to_f32(),
         }
     }
@@ -267,7 +269,7 @@ impl Samples {
                     $(Samples::$kind(v) => {
                         let mut out = Vec::with_capacity(count);
                         ranges.for_each(|r| out.extend_from_slice(&v[r]));
-                        Samples::$kind(out)
+                        Samples::$kind(out.into())
                     })*
                 }
             };
@@ -290,7 +292,7 @@ mod tests {
                     samples[place] = odd.unwrap_or(samples[place]);
                     let slow = samples.iter().fold(EMPTY, |r, &s| r.with(f64::from(s)));
                     assert_eq!(finite_range(&samples).is_some(), odd.is_none());
-                    let range = Samples::F32(samples).range();
+                    let range = Samples::F32(samples.into()).range();
                     assert_eq!(format!("{range:?}"), format!("{slow:?}"), "{count} {place}");
                 }
             }
@@ -299,9 +301,9 @@ mod tests {
 
     #[test]
     fn whole_numbers_have_their_ends_as_range() {
-        let range = Samples::I8(vec![3, -128, 127, 0]).range();
+        let range = Samples::I8(vec![3, -128, 127, 0].into()).range();
         assert_eq!((range.min, range.max), (-128.0, 127.0));
-        let none = Samples::U16(Vec::new()).range();
+        let none = Samples::U16(Vec::new().into()).range();
         assert!(none.min.is_nan() && none.max.is_nan());
     }
 }

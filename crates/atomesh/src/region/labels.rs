@@ -218,11 +218,11 @@ mod tests {
 
     #[test]
     fn labels_are_integers() {
-        let good = Samples::F32(vec![0.0, -3.0, 12.0]);
+        let good = Samples::F32(vec![0.0, -3.0, 12.0].into());
         assert_eq!(label_samples(&good), Ok(vec![0, -3, 12]));
-        let bad = label_samples(&Samples::F64(vec![1.0, 2.5]));
+        let bad = label_samples(&Samples::F64(vec![1.0, 2.5].into()));
         assert_eq!(bad, Err(RegionError::Label { index: 1, value: 2.5 }));
-        assert!(label_samples(&Samples::U32(vec![u32::MAX])).is_err());
-        assert!(label_samples(&Samples::F32(vec![f32::NAN])).is_err());
+        assert!(label_samples(&Samples::U32(vec![u32::MAX].into())).is_err());
+        assert!(label_samples(&Samples::F32(vec![f32::NAN].into())).is_err());
     }
 }

@@ -320,7 +320,7 @@ mod tests {
         // columns ½, 1, 1 and ½ wide, rows 1, 2 and 1 high
         let expected = BTreeMap::from([(1, 0.5 + 1.0 + 1.0 + 0.5), (2, 1.5 + 3.0), (3, 2.5)]);
         assert_eq!(image.measures(), expected);
-        let whole = Samples::I32(vec![7; 3 * 4 * 5]);
+        let whole = Samples::I32(vec![7; 3 * 4 * 5].into());
         let grid = Grid { shape: [3, 4, 5], step: [1.0, 2.0, 0.5] };
         let image = LabelImage { grid: &grid, samples: &whole };
         assert_eq!(image.measures(), BTreeMap::from([(7, 2.0 * 6.0 * 2.0)]));
@@ -345,7 +345,7 @@ mod tests {
             let label =
                 |i: u32| ((i + 1000 * seed).wrapping_mul(2_654_435_761) >> 20) as i32 % 7 / 5;
             let labels: Vec<i32> = (0..210).map(label).collect();
-            let samples = Samples::I32(labels.clone());
+            let samples = Samples::I32(labels.clone().into());
             let image = LabelImage { grid: &grid, samples: &samples };
             let runs = image.runs(&BTreeSet::from([0, 1]));
             let mut expected = BTreeMap::new();

@@ -101,7 +101,7 @@ fn labels<const D: usize>(inputs: &Inputs<'_, D>) -> Result<Option<Samples>, Run
     let Some(image) = inputs.labels else { return Ok(None) };
     same_shape("label image", inputs.image.frame(), image)?;
     let labels = label_samples(image.samples())?;
-    let Some(mask) = inputs.mask else { return Ok(Some(Samples::I32(labels))) };
+    let Some(mask) = inputs.mask else { return Ok(Some(Samples::I32(labels.into()))) };
     same_shape("mask", inputs.image.frame(), mask)?;
     let inside = samples_inside(mask.samples())?;
     let masked = labels.iter().zip(inside);

@@ -81,7 +81,7 @@ fn overlaps<const D: usize>(mesh: &Mesh<D>, shape: [usize; D]) -> Vec<f64> {
             let mut samples = vec![0.0; frame.sample_count()];
             samples[i] = 1.0;
             let options = SampleOptions::new(&[Statistic::Total]);
-            let samples = Samples::F64(samples);
+            let samples = Samples::F64(samples.into());
             sample_in_frame(mesh, &frame, &samples, options, &mut Silent).unwrap().values[0][0]
         })
         .collect()
@@ -174,7 +174,7 @@ where
         .enumerate()
         .map(|(i, &v)| f64::from(v) * unit * sample_box(i, shape).measure());
     let (expected, size) = terms.fold((0.0, 0.0), |(sum, size), t: f64| (sum + t, size + t.abs()));
-    let image = Image::new(frame, Samples::F32(values)).unwrap();
+    let image = Image::new(frame, Samples::F32(values.into())).unwrap();
     let options = SampleOptions::new(&[Statistic::Total]);
     let found = sample(&mesh, &image, options, &mut Silent).unwrap();
     let total: f64 = found.values[0].iter().sum();
@@ -271,7 +271,7 @@ fn polyhedra_are_sampled_as_simplices_are_and_only_where_the_image_is() {
 #[test]
 fn orientation_does_not_matter_and_mirrored_frames_neither() {
     let points = vec![[0.2, 0.1], [4.0, 1.0], [1.0, 3.7]];
-    let samples = || Samples::F32(noise(30, 3));
+    let samples = || Samples::F32(noise(30, 3).into());
     let frame = Frame::new([6, 5]).unwrap();
     let means = |corners: Vec<u32>, points: Vec<Point<2>>, frame| {
         let image = Image::new(frame, samples()).unwrap();
@@ -294,7 +294,7 @@ fn orientation_does_not_matter_and_mirrored_frames_neither() {
 #[test]
 fn samples_that_are_missing_leave_a_part_uncovered() {
     let frame = Frame::new([3, 2]).unwrap();
-    let samples = Samples::F32(vec![1.0, f32::NAN, 3.0, 1.0, f32::NAN, 3.0]);
+    let samples = Samples::F32(vec![1.0, f32::NAN, 3.0, 1.0, f32::NAN, 3.0].into());
     let image = Image::new(frame, samples).unwrap();
     let points = vec![[0.0, 0.0], [2.0, 0.0], [2.0, 1.0], [0.0, 1.0]];
     let mesh = Mesh::new(points, vec![0, 1, 2, 0, 2, 3]).unwrap();
@@ -327,7 +327,7 @@ fn wrong_samples_are_refused() {
     let error = |shape: [usize; 2], samples: Vec<f32>, statistic| {
         let frame = Frame::new(shape).unwrap();
         let kinds = [statistic];
-        let (samples, options) = (Samples::F32(samples), SampleOptions::new(&kinds));
+        let (samples, options) = (Samples::F32(samples.into()), SampleOptions::new(&kinds));
         sample_in_frame(&mesh, &frame, &samples, options, &mut Silent).err()
     };
     assert_eq!(error([2, 2], vec![0.0; 4], Statistic::Mean), None);
@@ -345,7 +345,7 @@ fn wrong_samples_are_refused() {
             ControlFlow::Break(())
         }
     }
-    let image = Image::new(Frame::new([2, 2]).unwrap(), Samples::U8(vec![0; 4])).unwrap();
+    let image = Image::new(Frame::new([2, 2]).unwrap(), Samples::U8(vec![0; 4].into())).unwrap();
     let options = SampleOptions::new(&[Statistic::Mean]);
     let stopped = sample(&mesh, &image, options, &mut Stop);
     assert_eq!(stopped, Err(SampleError::Cancelled(Cancelled)));

@@ -38,7 +38,7 @@ pub(super) fn draw<const D: usize>(
     Ok(if options.bytes {
         Samples::U8(values.par_iter().map(|&v| rounded(v)).collect())
     } else {
-        Samples::F32(values)
+        Samples::F32(values.into())
     })
 }
 
@@ -68,7 +68,7 @@ fn draw_bytes<const D: usize>(
         }
         bytes.iter_mut().zip(values).for_each(|(byte, value)| *byte = rounded(*value));
     });
-    Ok(Samples::U8(bytes))
+    Ok(Samples::U8(bytes.into()))
 }
 
 /// As many values as the grid has samples.

@@ -382,7 +382,7 @@ fn faces_of_features_lie_along_them() {
 fn cells_have_all_of_an_image_between_them() {
     let frame = Frame::new([7, 6, 5]).unwrap();
     let samples: Vec<f32> = (0..210).map(|i| (i % 11) as f32).collect();
-    let image = Image::new(frame, Samples::F32(samples)).unwrap();
+    let image = Image::new(frame, Samples::F32(samples.into())).unwrap();
     let bounds = Bounds { min: [0.0; 3], max: [6.0, 5.0, 4.0] };
     let sites = [[1.0, 1.0, 1.0], [5.0, 1.5, 2.0], [3.0, 4.5, 3.0], [2.0, 3.0, 0.5]];
     let cells = voronoi(&Delaunay::<3>::new(), &sites, bounds, &mut Silent).unwrap();

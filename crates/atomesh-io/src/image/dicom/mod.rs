@@ -209,13 +209,13 @@ impl Volume {
         memory: Memory,
     ) -> Result<Self, ReadReason> {
         let samples = match (is_plain, pixels.stored, pixels.is_signed) {
-            (false, ..) => Samples::F32(room(count, memory)?),
-            (_, ..9, false) => Samples::U8(room(count, memory)?),
-            (_, ..9, true) => Samples::I8(room(count, memory)?),
-            (_, ..17, false) => Samples::U16(room(count, memory)?),
-            (_, ..17, true) => Samples::I16(room(count, memory)?),
-            (_, _, false) => Samples::U32(room(count, memory)?),
-            (_, _, true) => Samples::I32(room(count, memory)?),
+            (false, ..) => Samples::F32(room(count, memory)?.into()),
+            (_, ..9, false) => Samples::U8(room(count, memory)?.into()),
+            (_, ..9, true) => Samples::I8(room(count, memory)?.into()),
+            (_, ..17, false) => Samples::U16(room(count, memory)?.into()),
+            (_, ..17, true) => Samples::I16(room(count, memory)?.into()),
+            (_, _, false) => Samples::U32(room(count, memory)?.into()),
+            (_, _, true) => Samples::I32(room(count, memory)?.into()),
         };
         Ok(Self { samples })
     }
@@ -226,9 +226,9 @@ impl Volume {
         macro_rules! append_as {
             ($($kind:ident $number:ty),*) => {
                 match &mut self.samples {
-                    $(Samples::$kind(v) => v.extend(values.iter().map(|&x| x as $number)),)*
+                    $(Samples::$kind(v) => v.to_mut().extend(values.iter().map(|&x| x as $number)),)*
                     Samples::F32(v) => {
-                        v.extend(values.iter().map(|&x| scale.of(x)));
+                        v.to_mut().extend(values.iter().map(|&x| scale.of(x)));
                     }
                     _ => {} // no other is made
                 }

@@ -14,7 +14,7 @@ fn samples(bytes: &[u8], shape: [usize; 2]) -> Vec<u8> {
     let image = decode(bytes).unwrap();
     assert_eq!(image.shape(), shape);
     match image.samples() {
-        Samples::U8(samples) => samples.clone(),
+        Samples::U8(samples) => samples.to_vec(),
         other => panic!("{}", other.type_name()),
     }
 }

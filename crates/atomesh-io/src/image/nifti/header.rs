@@ -273,7 +273,7 @@ mod tests {
     /// A header for 4 × 3 × 2 bytes, changed by `edit`, and read.
     fn parse(edit: impl FnOnce(&mut [u8; BYTES])) -> Result<Header, ReadReason> {
         let frame = Frame::new([4, 3, 2]).unwrap();
-        let image = Image::new(frame, Samples::U8(vec![0; 24])).unwrap();
+        let image = Image::new(frame, Samples::U8(vec![0; 24].into())).unwrap();
         let encoded = encode(&ImageView::of(&image), 2, 8).unwrap();
         let mut bytes = std::array::from_fn(|k| encoded[k]);
         edit(&mut bytes);

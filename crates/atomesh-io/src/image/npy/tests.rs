@@ -30,34 +30,34 @@ fn arrays_are_read_in_either_order() {
     for bytes in [c, f] {
         let image = decode(&bytes).unwrap();
         assert_eq!(image.shape(), [3, 2]);
-        assert_eq!(*image.samples(), Samples::U8(vec![0, 1, 2, 10, 11, 12]));
+        assert_eq!(*image.samples(), Samples::U8(vec![0, 1, 2, 10, 11, 12].into()));
     }
 }
 
 #[test]
 fn every_type_is_read() {
     let cases: [(&str, &[u8], Samples); 14] = [
-        ("|b1", &[2, 0], Samples::U8(vec![1, 0])),
-        ("?", &[1, 0], Samples::U8(vec![1, 0])),
-        ("|u1", &[200, 0], Samples::U8(vec![200, 0])),
-        ("|i1", &[200, 0], Samples::I8(vec![-56, 0])),
-        ("<u2", &[1, 2, 0, 0], Samples::U16(vec![513, 0])),
-        (">i2", &[255, 254, 0, 0], Samples::I16(vec![-2, 0])),
-        (">u4", &[1, 0, 0, 2, 0, 0, 0, 0], Samples::U32(vec![16777218, 0])),
-        ("<i4", &[254, 255, 255, 255, 0, 0, 0, 0], Samples::I32(vec![-2, 0])),
+        ("|b1", &[2, 0], Samples::U8(vec![1, 0].into())),
+        ("?", &[1, 0], Samples::U8(vec![1, 0].into())),
+        ("|u1", &[200, 0], Samples::U8(vec![200, 0].into())),
+        ("|i1", &[200, 0], Samples::I8(vec![-56, 0].into())),
+        ("<u2", &[1, 2, 0, 0], Samples::U16(vec![513, 0].into())),
+        (">i2", &[255, 254, 0, 0], Samples::I16(vec![-2, 0].into())),
+        (">u4", &[1, 0, 0, 2, 0, 0, 0, 0], Samples::U32(vec![16777218, 0].into())),
+        ("<i4", &[254, 255, 255, 255, 0, 0, 0, 0], Samples::I32(vec![-2, 0].into())),
         (
             ">u8",
             &[0, 0, 0, 1, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0],
-            Samples::F64(vec![4294967296.0, 0.0]),
+            Samples::F64(vec![4294967296.0, 0.0].into()),
         ),
-        ("<i8", &[255; 16], Samples::F64(vec![-1.0, -1.0])),
-        ("<f2", &[0, 0x3c, 0, 0xc0], Samples::F32(vec![1.0, -2.0])),
-        (">f4", &[0x3f, 0x80, 0, 0, 0, 0, 0, 0], Samples::F32(vec![1.0, 0.0])),
-        ("<f4", &[0, 0, 0x80, 0x3f, 0, 0, 0, 0], Samples::F32(vec![1.0, 0.0])),
+        ("<i8", &[255; 16], Samples::F64(vec![-1.0, -1.0].into())),
+        ("<f2", &[0, 0x3c, 0, 0xc0], Samples::F32(vec![1.0, -2.0].into())),
+        (">f4", &[0x3f, 0x80, 0, 0, 0, 0, 0, 0], Samples::F32(vec![1.0, 0.0].into())),
+        ("<f4", &[0, 0, 0x80, 0x3f, 0, 0, 0, 0], Samples::F32(vec![1.0, 0.0].into())),
         (
             ">f8",
             &[0xbf, 0xe0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0],
-            Samples::F64(vec![-0.5, 0.0]),
+            Samples::F64(vec![-0.5, 0.0].into()),
         ),
     ];
     for (descr, bytes, expected) in cases {
@@ -116,7 +116,7 @@ fn what_is_not_supported_is_named() {
 
 #[test]
 fn the_header_is_what_numpy_writes() {
-    let image = Image::new(Frame::new([3, 2]).unwrap(), Samples::F32(vec![0.5; 6])).unwrap();
+    let image = Image::new(Frame::new([3, 2]).unwrap(), Samples::F32(vec![0.5; 6].into())).unwrap();
     let mut bytes = std::io::Cursor::new(Vec::new());
     write(&mut bytes, &ImageView::of(&image), &mut Silent).unwrap();
     let bytes = bytes.into_inner();

@@ -89,8 +89,8 @@ fn numbers(
     })?;
     let stretches = values.meaning == Meaning::Brightness;
     match read {
-        Samples::U8(v) => values.of(checked(v, header, stretches)?, header.channels),
-        Samples::U16(v) => values.of(checked(v, header, stretches)?, header.channels),
+        Samples::U8(v) => values.of(checked(v.into_vec(), header, stretches)?, header.channels),
+        Samples::U16(v) => values.of(checked(v.into_vec(), header, stretches)?, header.channels),
         other => Ok(other), // no other type is asked for
     }
 }

@@ -19,31 +19,31 @@ fn message(bytes: &[u8]) -> String {
 #[test]
 fn numbers_are_read_as_text_and_as_bytes() {
     let text = samples(b"P2\n# a note\n2 2 # another\n255\n0 10\n20 255\n");
-    assert_eq!(text, Samples::U8(vec![0, 10, 20, 255]));
-    assert_eq!(samples(b"P5 1 2 65535\n\x01\x02\xff\xff"), Samples::U16(vec![258, 65535]));
-    assert_eq!(samples(b"P2 2 1 65535 258 65535"), Samples::U16(vec![258, 65535]));
-    assert_eq!(samples(b"P6 1 1 255\n\xff\x00\x00"), Samples::U8(vec![76]));
-    assert_eq!(samples(b"P3 2 1 255 0 255 0 9 9 9"), Samples::U8(vec![150, 9]));
+    assert_eq!(text, Samples::U8(vec![0, 10, 20, 255].into()));
+    assert_eq!(samples(b"P5 1 2 65535\n\x01\x02\xff\xff"), Samples::U16(vec![258, 65535].into()));
+    assert_eq!(samples(b"P2 2 1 65535 258 65535"), Samples::U16(vec![258, 65535].into()));
+    assert_eq!(samples(b"P6 1 1 255\n\xff\x00\x00"), Samples::U8(vec![76].into()));
+    assert_eq!(samples(b"P3 2 1 255 0 255 0 9 9 9"), Samples::U8(vec![150, 9].into()));
 }
 
 #[test]
 fn other_greatest_values_are_stretched_and_rounded() {
-    assert_eq!(samples(b"P2 3 1 15 0 5 15 "), Samples::U8(vec![0, 85, 255]));
+    assert_eq!(samples(b"P2 3 1 15 0 5 15 "), Samples::U8(vec![0, 85, 255].into()));
     // 255 / 100 · 50 = 127.5, and one above the greatest is cut
-    assert_eq!(samples(b"P5 3 1 100\n\x00\x32\x65"), Samples::U8(vec![0, 128, 255]));
+    assert_eq!(samples(b"P5 3 1 100\n\x00\x32\x65"), Samples::U8(vec![0, 128, 255].into()));
     // 65535 / 1000 · 1 = 65.535
-    assert_eq!(samples(b"P2 3 1 1000 0 1 1000"), Samples::U16(vec![0, 66, 65535]));
+    assert_eq!(samples(b"P2 3 1 1000 0 1 1000"), Samples::U16(vec![0, 66, 65535].into()));
 }
 
 #[test]
 fn bits_are_black_where_they_are_1() {
-    assert_eq!(samples(b"P1\n3 2\n010\n1 1 0"), Samples::U8(vec![255, 0, 255, 0, 0, 255]));
+    assert_eq!(samples(b"P1\n3 2\n010\n1 1 0"), Samples::U8(vec![255, 0, 255, 0, 0, 255].into()));
     let rows = samples(b"P4 9 2\n\x80\x80\x01\x7f");
     let mut expected = vec![255; 18];
     for black in [0, 8, 9 + 7] {
         expected[black] = 0;
     }
-    assert_eq!(rows, Samples::U8(expected));
+    assert_eq!(rows, Samples::U8(expected.into()));
 }
 
 #[test]
@@ -55,17 +55,26 @@ fn pam_is_read_with_and_without_a_type() {
         );
         [head.as_bytes(), body].concat()
     };
-    assert_eq!(samples(&pam(1, 255, "GRAYSCALE", &[1, 2])), Samples::U8(vec![1, 2]));
-    assert_eq!(samples(&pam(1, 65535, "GRAYSCALE", &[1, 2, 0, 3])), Samples::U16(vec![258, 3]));
-    assert_eq!(samples(&pam(2, 255, "GRAYSCALE_ALPHA", &[1, 9, 2, 9])), Samples::U8(vec![1, 2]));
-    assert_eq!(samples(&pam(3, 255, "RGB", &[255, 0, 0, 9, 9, 9])), Samples::U8(vec![76, 9]));
+    assert_eq!(samples(&pam(1, 255, "GRAYSCALE", &[1, 2])), Samples::U8(vec![1, 2].into()));
+    assert_eq!(
+        samples(&pam(1, 65535, "GRAYSCALE", &[1, 2, 0, 3])),
+        Samples::U16(vec![258, 3].into())
+    );
+    assert_eq!(
+        samples(&pam(2, 255, "GRAYSCALE_ALPHA", &[1, 9, 2, 9])),
+        Samples::U8(vec![1, 2].into())
+    );
+    assert_eq!(
+        samples(&pam(3, 255, "RGB", &[255, 0, 0, 9, 9, 9])),
+        Samples::U8(vec![76, 9].into())
+    );
     let rgba = [255, 0, 0, 1, 9, 9, 9, 1];
-    assert_eq!(samples(&pam(4, 255, "RGB_ALPHA", &rgba)), Samples::U8(vec![76, 9]));
-    assert_eq!(samples(&pam(4, 255, "", &rgba)), Samples::U8(vec![76, 9]));
-    assert_eq!(samples(&pam(1, 65535, "", &[1, 2, 0, 3])), Samples::U16(vec![258, 3]));
-    assert_eq!(samples(&pam(1, 1, "BLACKANDWHITE", &[0, 1])), Samples::U8(vec![0, 255]));
+    assert_eq!(samples(&pam(4, 255, "RGB_ALPHA", &rgba)), Samples::U8(vec![76, 9].into()));
+    assert_eq!(samples(&pam(4, 255, "", &rgba)), Samples::U8(vec![76, 9].into()));
+    assert_eq!(samples(&pam(1, 65535, "", &[1, 2, 0, 3])), Samples::U16(vec![258, 3].into()));
+    assert_eq!(samples(&pam(1, 1, "BLACKANDWHITE", &[0, 1])), Samples::U8(vec![0, 255].into()));
     let alpha = pam(2, 1, "BLACKANDWHITE_ALPHA", &[0, 1, 1, 0]);
-    assert_eq!(samples(&alpha), Samples::U8(vec![0, 255]));
+    assert_eq!(samples(&alpha), Samples::U8(vec![0, 255].into()));
     for (file, part) in [
         (pam(1, 1, "BLACKANDWHITE", &[0, 2]), "sample is 2"),
         (pam(1, 2, "BLACKANDWHITE", &[0, 2]), "MAXVAL is 2"),
@@ -112,11 +121,14 @@ fn labels_stay_as_they_are_stored() {
         let options = ReadOptions { meaning: Meaning::Labels, ..ReadOptions::default() };
         decode_image(bytes, FORMAT, &options, &mut Silent).map(|image| image.samples().clone())
     };
-    assert_eq!(labels(b"P5 4 1 3\n\x00\x01\x02\x03").unwrap(), Samples::U8(vec![0, 1, 2, 3]));
-    assert_eq!(labels(b"P2 2 1 1000 0 999").unwrap(), Samples::U16(vec![0, 999]));
+    assert_eq!(
+        labels(b"P5 4 1 3\n\x00\x01\x02\x03").unwrap(),
+        Samples::U8(vec![0, 1, 2, 3].into())
+    );
+    assert_eq!(labels(b"P2 2 1 1000 0 999").unwrap(), Samples::U16(vec![0, 999].into()));
     // 1 is black
-    assert_eq!(labels(b"P1 2 1 1 0").unwrap(), Samples::U8(vec![0, 1]));
-    assert_eq!(labels(b"P4 2 1\n\x80").unwrap(), Samples::U8(vec![0, 1]));
+    assert_eq!(labels(b"P1 2 1 1 0").unwrap(), Samples::U8(vec![0, 1].into()));
+    assert_eq!(labels(b"P4 2 1\n\x80").unwrap(), Samples::U8(vec![0, 1].into()));
     let error = labels(b"P6 1 1 255\n\xff\x00\x00").unwrap_err();
     assert!(matches!(error, ReadReason::ColourLabels { .. }), "{error}");
 }

@@ -70,9 +70,9 @@ fn a_flat_image_in_time_has_its_traces_along_x() {
 fn text_samples_are_those_of_binary_ones() {
     let text = b"n1=2 n2=3 data_format=ascii_float in=stdin\n\x0c\x0c\x04 1 2.5\n3 -4 5e1 6";
     let image = load(text, None).unwrap().image;
-    assert_eq!(*image.samples(), Samples::F32(vec![1.0, 2.5, 3.0, -4.0, 50.0, 6.0]));
+    assert_eq!(*image.samples(), Samples::F32(vec![1.0, 2.5, 3.0, -4.0, 50.0, 6.0].into()));
     let down = load(text, Some(Vertical::Time)).unwrap().image;
-    assert_eq!(*down.samples(), Samples::F32(vec![1.0, 3.0, 50.0, 2.5, -4.0, 6.0]));
+    assert_eq!(*down.samples(), Samples::F32(vec![1.0, 3.0, 50.0, 2.5, -4.0, 6.0].into()));
 }
 
 #[test]

@@ -18,15 +18,15 @@ pub(super) fn samples(
 ) -> Result<Samples, ReadReason> {
     let channels = page.channels();
     let stored = match decoded {
-        DecodingResult::U8(v) => Samples::U8(whole_bytes(v, page, values.meaning)),
-        DecodingResult::U16(v) => Samples::U16(v),
-        DecodingResult::U32(v) => Samples::U32(v),
+        DecodingResult::U8(v) => Samples::U8(whole_bytes(v, page, values.meaning).into()),
+        DecodingResult::U16(v) => Samples::U16(v.into()),
+        DecodingResult::U32(v) => Samples::U32(v.into()),
         DecodingResult::F16(v) => Samples::F32(v.iter().map(|h| h.to_f32()).collect()),
-        DecodingResult::F32(v) => Samples::F32(v),
-        DecodingResult::F64(v) => Samples::F64(v),
-        DecodingResult::I8(v) => Samples::I8(v),
-        DecodingResult::I16(v) => Samples::I16(v),
-        DecodingResult::I32(v) => Samples::I32(v),
+        DecodingResult::F32(v) => Samples::F32(v.into()),
+        DecodingResult::F64(v) => Samples::F64(v.into()),
+        DecodingResult::I8(v) => Samples::I8(v.into()),
+        DecodingResult::I16(v) => Samples::I16(v.into()),
+        DecodingResult::I32(v) => Samples::I32(v.into()),
         DecodingResult::U64(v) => {
             let doubles = without_colour(v, channels)?.iter().map(|&n| n as f64).collect();
             return Ok(Samples::F64(doubles));
@@ -51,14 +51,14 @@ pub(super) fn mixed(
         values.check_floats()?;
     }
     Ok(match stored {
-        Samples::U8(v) => return values.of(v, channels),
-        Samples::U16(v) => return values.of(v, channels),
-        Samples::U32(v) => return values.of(v, channels),
-        Samples::F32(v) => Samples::F32(grey_floats(v, channels)),
-        Samples::F64(v) => Samples::F64(grey_floats(v, channels)),
-        Samples::I8(v) => Samples::I8(without_colour(v, channels)?),
-        Samples::I16(v) => Samples::I16(without_colour(v, channels)?),
-        Samples::I32(v) => Samples::I32(without_colour(v, channels)?),
+        Samples::U8(v) => return values.of(v.into_vec(), channels),
+        Samples::U16(v) => return values.of(v.into_vec(), channels),
+        Samples::U32(v) => return values.of(v.into_vec(), channels),
+        Samples::F32(v) => Samples::F32(grey_floats(v.into_vec(), channels).into()),
+        Samples::F64(v) => Samples::F64(grey_floats(v.into_vec(), channels).into()),
+        Samples::I8(v) => Samples::I8(without_colour(v.into_vec(), channels)?.into()),
+        Samples::I16(v) => Samples::I16(without_colour(v.into_vec(), channels)?.into()),
+        Samples::I32(v) => Samples::I32(without_colour(v.into_vec(), channels)?.into()),
         other => other, // no other type is held
     })
 }
@@ -132,6 +132,7 @@ pub(super) fn append(
         ($($kind:ident),*) => {
             match (volume.as_mut(), plane) {
                 $((Some(Samples::$kind(all)), Samples::$kind(more)) => {
+                    let all = all.to_mut();
                     memory.grow(all, more.len(), count)?;
                     all.extend_from_slice(&more);
                 })*

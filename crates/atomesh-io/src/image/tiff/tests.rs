@@ -26,14 +26,14 @@ fn encode<const D: usize>(shape: [usize; D], samples: Samples) -> Vec<u8> {
 #[test]
 fn every_type_goes_there_and_back() {
     for samples in [
-        Samples::U8(vec![0, 1, 255, 3, 4, 5]),
-        Samples::I8(vec![-128, 1, 127, 3, 4, 5]),
-        Samples::U16(vec![0, 1, 65535, 3, 4, 5]),
-        Samples::I16(vec![-32768, 1, 2, 3, 4, 5]),
-        Samples::U32(vec![u32::MAX, 1, 2, 3, 4, 5]),
-        Samples::I32(vec![i32::MIN, 1, 2, 3, 4, 5]),
-        Samples::F32(vec![-0.5, f32::INFINITY, 2.0, 3.0, 4.0, 1e-30]),
-        Samples::F64(vec![-0.5, 1e300, 2.0, 3.0, 4.0, 5.0]),
+        Samples::U8(vec![0, 1, 255, 3, 4, 5].into()),
+        Samples::I8(vec![-128, 1, 127, 3, 4, 5].into()),
+        Samples::U16(vec![0, 1, 65535, 3, 4, 5].into()),
+        Samples::I16(vec![-32768, 1, 2, 3, 4, 5].into()),
+        Samples::U32(vec![u32::MAX, 1, 2, 3, 4, 5].into()),
+        Samples::I32(vec![i32::MIN, 1, 2, 3, 4, 5].into()),
+        Samples::F32(vec![-0.5, f32::INFINITY, 2.0, 3.0, 4.0, 1e-30].into()),
+        Samples::F64(vec![-0.5, 1e300, 2.0, 3.0, 4.0, 5.0].into()),
     ] {
         let flat = decode(&encode([3, 2], samples.clone())).unwrap();
         assert_eq!((flat.shape(), flat.samples()), (vec![3, 2], &samples));
@@ -64,19 +64,19 @@ fn pages_of_another_shape_or_type_are_named() {
 fn colour_becomes_luminance_and_wide_integers_doubles() {
     let mut bytes = Cursor::new(Vec::new());
     TiffEncoder::new(&mut bytes).unwrap().write_image::<RGB8>(2, 1, &[255, 0, 0, 9, 9, 9]).unwrap();
-    assert_eq!(*decode(bytes.get_ref()).unwrap().samples(), Samples::U8(vec![76, 9]));
+    assert_eq!(*decode(bytes.get_ref()).unwrap().samples(), Samples::U8(vec![76, 9].into()));
 
     let mut bytes = Cursor::new(Vec::new());
     TiffEncoder::new(&mut bytes)
         .unwrap()
         .write_image::<RGB32Float>(1, 1, &[1.0, 0.0, 0.0])
         .unwrap();
-    assert_eq!(*decode(bytes.get_ref()).unwrap().samples(), Samples::F32(vec![0.299]));
+    assert_eq!(*decode(bytes.get_ref()).unwrap().samples(), Samples::F32(vec![0.299].into()));
 
     let mut bytes = Cursor::new(Vec::new());
     TiffEncoder::new(&mut bytes).unwrap().write_image::<Gray64>(1, 1, &[1 << 40]).unwrap();
     let image = decode(bytes.get_ref()).unwrap();
-    assert_eq!(*image.samples(), Samples::F64(vec![(1u64 << 40) as f64]));
+    assert_eq!(*image.samples(), Samples::F64(vec![(1u64 << 40) as f64].into()));
 }
 
 #[test]
@@ -89,7 +89,7 @@ fn cut_files_are_refused_wherever_they_end() {
 
 #[test]
 fn an_absurd_size_is_refused_before_room_is_made() {
-    let mut bytes = encode([3, 2], Samples::U8(vec![0; 6]));
+    let mut bytes = encode([3, 2], Samples::U8(vec![0; 6].into()));
     // the entries of width, length and rows per strip, each 12 bytes
     for tag in [256u16, 257, 278] {
         let [low, high] = tag.to_le_bytes();
@@ -296,20 +296,23 @@ fn a_spacing_that_is_given_needs_no_unit_of_the_files() {
 fn few_bits_are_stretched_as_pictures_and_stored_as_labels() {
     let bits = |depth: u16| [short(256, 3), short(257, 1), short(258, depth), short(278, 1)];
     let one = pages(1, &[&[0b1010_0000]], &bits(1));
-    assert_eq!(*decode(&one).unwrap().samples(), Samples::U8(vec![255, 0, 255]));
+    assert_eq!(*decode(&one).unwrap().samples(), Samples::U8(vec![255, 0, 255].into()));
     let labels = meant(&one, Meaning::Labels).unwrap();
-    assert_eq!(*labels.image.samples(), Samples::U8(vec![1, 0, 1]));
+    assert_eq!(*labels.image.samples(), Samples::U8(vec![1, 0, 1].into()));
     let two = pages(1, &[&[0b0001_1100]], &bits(2));
-    assert_eq!(*decode(&two).unwrap().samples(), Samples::U8(vec![0, 85, 255]));
-    assert_eq!(*meant(&two, Meaning::Mask).unwrap().image.samples(), Samples::U8(vec![0, 1, 3]));
+    assert_eq!(*decode(&two).unwrap().samples(), Samples::U8(vec![0, 85, 255].into()));
+    assert_eq!(
+        *meant(&two, Meaning::Mask).unwrap().image.samples(),
+        Samples::U8(vec![0, 1, 3].into())
+    );
 }
 
 #[test]
 fn values_of_labels_stay_where_0_is_white() {
     let file = pages(1, &[&[1, 2], &[3, 0]], &[short(262, 0)]);
-    assert_eq!(*decode(&file).unwrap().samples(), Samples::U8(vec![254, 253, 252, 255]));
+    assert_eq!(*decode(&file).unwrap().samples(), Samples::U8(vec![254, 253, 252, 255].into()));
     let labels = meant(&file, Meaning::Labels).unwrap();
-    assert_eq!(*labels.image.samples(), Samples::U8(vec![1, 2, 3, 0]));
+    assert_eq!(*labels.image.samples(), Samples::U8(vec![1, 2, 3, 0].into()));
     assert_eq!(labels.notes, [ReadNote::WhiteIsZero]);
 }
 
@@ -324,10 +327,10 @@ fn labels_of_a_palette_are_its_indices() {
     let file = pages(1, &[&[0, 1], &[2, 1]], &[short(262, 3), (320, 3, map)]);
     assert!(decode(&file).is_err(), "a picture");
     let labels = meant(&file, Meaning::Labels).unwrap();
-    assert_eq!(*labels.image.samples(), Samples::U8(vec![0, 1, 2, 1]));
+    assert_eq!(*labels.image.samples(), Samples::U8(vec![0, 1, 2, 1].into()));
     assert_eq!(labels.notes, [ReadNote::PaletteIndices { is_black_elsewhere: false }]);
     let colours = meant(&file, Meaning::LabelsByColour).unwrap();
-    assert_eq!(*colours.image.samples(), Samples::U32(vec![3, 2, 1, 2]));
+    assert_eq!(*colours.image.samples(), Samples::U32(vec![3, 2, 1, 2].into()));
 }
 
 #[test]

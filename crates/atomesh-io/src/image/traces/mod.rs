@@ -44,13 +44,13 @@ pub(super) fn read(source: &mut dyn Read, layout: &TraceLayout<'_>) -> Result<Sa
     /// Reads numbers with one function for each type.
     macro_rules! read_as {
         ($kind:ident, $number:ident) => {
-            Samples::$kind(spread(source, layout, $number::from_be_bytes)?)
+            Samples::$kind(spread(source, layout, $number::from_be_bytes)?.into())
         };
     }
     Ok(match layout.format {
         SampleFormat::Ibm => {
             let ibm = Ibm::new();
-            Samples::F32(spread(source, layout, |b| ibm.decode(u32::from_be_bytes(b)))?)
+            Samples::F32(spread(source, layout, |b| ibm.decode(u32::from_be_bytes(b)))?.into())
         }
         SampleFormat::F32 => read_as!(F32, f32),
         SampleFormat::F64 => read_as!(F64, f64),

@@ -131,7 +131,7 @@ pub(super) fn crest_points<const D: usize>(
     let grid = image.frame().grid(options.units);
     let copied;
     let values = match image.samples() {
-        Samples::F32(values) => values,
+        Samples::F32(values) => &**values,
         other => {
             copied = other.to_f32();
             &copied

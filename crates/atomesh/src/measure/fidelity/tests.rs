@@ -46,7 +46,7 @@ fn means_of_cells_leave_the_deviation_within_them() {
     assert!((report.deviation - 1.0).abs() < 0.01, "{report:?}");
     assert!((report.constant_rms - 1.0).abs() < 0.02 && report.linear_rms < report.deviation);
     // a constant image has no deviation to share
-    let flat = Samples::U8(vec![7; 17 * 17]);
+    let flat = Samples::U8(vec![7; 17 * 17].into());
     let report = fidelity(&squares(2, 8.0), &frame, &flat, &mut Silent).unwrap();
     assert_eq!((report.deviation, report.constant_rms, report.linear_rms), (0.0, 0.0, 0.0));
     assert_eq!(report.constant_relative, None);
