@@ -9,7 +9,7 @@ from pathlib import Path
 
 import pytest
 
-NOTEBOOKS = sorted(Path(__file__).parents[1].joinpath("notebooks").glob("*.py"))
+NOTEBOOKS = sorted(Path(__file__).resolve().parents[1].joinpath("notebooks").glob("*.py"))
 AS_NOTEBOOKS = all(importlib.util.find_spec(name) for name in ("jupytext", "nbclient", "ipykernel"))
 
 
