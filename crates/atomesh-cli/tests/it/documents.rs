@@ -93,7 +93,7 @@ fn sources(folder: &Path) -> String {
 #[test]
 fn ci_runs_the_commands_of_the_readme() {
     let script = read(".ci/run");
-    for mark in ["main", "test"] {
+    for mark in ["main", "test", "python", "python-test"] {
         let command = block(&format!("```sh {mark}"));
         assert!(!command.is_empty(), "the README has a block marked {mark}");
         assert!(
