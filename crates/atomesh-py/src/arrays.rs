@@ -4,7 +4,7 @@ use std::any::Any;
 use std::sync::Arc;
 
 use atomesh::image::{Samples, Values};
-use numpy::ndarray::ArrayView;
+use numpy::ndarray::{ArrayD, ArrayView};
 use numpy::{
     Element, IxDyn, PyArray, PyArrayDyn, PyArrayMethods, PyUntypedArray, PyUntypedArrayMethods,
 };
@@ -183,4 +183,20 @@ pub fn points<const D: usize>(given: &Bound<'_, PyAny>) -> PyResult<Vec<[f64; D]
         return Err(errors::input(py, message));
     }
     Ok(array.readonly().as_slice()?.as_chunks().0.to_vec())
+}
+
+/// Rows of whole numbers from whatever NumPy takes for an array.
+///
+/// # Errors
+/// `InputError` if they are negative or too large for numbers of points.
+pub fn indices(given: &Bound<'_, PyAny>) -> PyResult<ArrayD<u32>> {
+    let py = given.py();
+    let numpy = py.import("numpy")?;
+    let array = numpy.call_method1("ascontiguousarray", (given, "int64"))?;
+    let array = array.cast_into::<PyArrayDyn<i64>>()?;
+    let array = array.readonly();
+    if let Some(odd) = array.as_slice()?.iter().find(|&&i| u32::try_from(i).is_err()) {
+        return Err(errors::input(py, format!("a point's number is {odd}; expected 0 or more")));
+    }
+    Ok(array.as_array().mapv(|i| i as u32))
 }

@@ -49,6 +49,14 @@ pub fn in_keywords(text: &str) -> String {
         let known = RunConfig::SECTIONS.iter().any(|(_, names)| names.contains(&option.as_str()));
         if known || OTHERS.contains(&option.as_str()) {
             out += keyword(&option);
+            // as in --fill VALUE
+            let mut after = rest.strip_prefix(' ').unwrap_or_default().chars();
+            if after.next().is_some_and(|c| c.is_ascii_uppercase())
+                && after.next().is_some_and(|c| c.is_ascii_uppercase())
+            {
+                out = out + "=" + &rest[1..];
+                continue;
+            }
         } else {
             out = out + "--" + name;
         }

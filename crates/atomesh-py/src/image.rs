@@ -24,7 +24,8 @@ use crate::work::work;
 ///     The samples, x last. Arrays that are C-contiguous and of type uint8, int8, uint16, int16, uint32, int32, float32
 ///     or float64 are taken without a copy: do not change them while work goes on. Others are converted: bool to uint8,
 ///     float16 to float32, wider ones to float64.
-///     NaN marks samples without data; `fill=` of `mesh` says what stands for them where a value is needed.
+///     NaN, and what is masked of a masked array, marks samples without data; with NaN, `fill=` of `mesh` must say what
+///     stands for them where a value is needed.
 /// spacing : sequence of float, optional
 ///     World units from one sample to the next along x, y (and z). Default 1.
 /// origin : sequence of float, optional
@@ -147,8 +148,9 @@ impl Image {
     }
 
     /// The image of another package's object: SimpleITK.Image, itk.Image, a nibabel image, pyvista.ImageData, an
-    /// xarray.DataArray, or whatever NumPy takes for an array. Frame and order of axes come from the object; nibabel's
-    /// world (right, anterior, superior) is turned into DICOM's and ITK's (left, posterior, superior), as `read` does.
+    /// xarray.DataArray, or whatever NumPy takes for an array. Frame and order of axes come from the object. The world is
+    /// that of `read`: RAS (x to the right, y to the front, z up), as nibabel's; volumes of SimpleITK and ITK, which are in
+    /// LPS, are turned to it by half about z.
     ///
     /// Parameters
     /// ----------
@@ -221,6 +223,7 @@ impl Image {
         self.notes.clone()
     }
 
+    #[pyo3(signature = (dtype = None, copy = None))]
     fn __array__<'py>(
         &self,
         py: Python<'py>,

@@ -8,15 +8,17 @@ use std::path::PathBuf;
 use std::sync::Arc;
 
 use atomesh::image::{Frame, Image as CoreImage};
+use atomesh::mesh::{FacetGroup, Mesh as CoreMesh, Regions, Tags};
 use atomesh::run::Outcome;
 use atomesh_io::image::{AnyImage, LoadedImage};
+use atomesh_io::mesh::{LoadedMesh, OwnedField};
 use atomesh_job::mesh::{MadeMesh, MeshImages, ShownImage, prepare, read_shown};
 use atomesh_job::options::{OutputOptions, RunConfig};
 use atomesh_job::sample::Property;
-use atomesh_job::{Dimension, JobError, Session};
+use atomesh_job::{Dimension, JobError, Note, NoteKind, Session};
 use pyo3::exceptions::{PyKeyError, PyTypeError};
 use pyo3::prelude::*;
-use pyo3::types::{PyBytes, PyDict, PyMapping};
+use pyo3::types::{PyBytes, PyDict, PyMapping, PyType};
 
 use crate::arrays;
 use crate::edit::Editor;
@@ -130,6 +132,43 @@ impl Mesh {
 
 #[pymethods]
 impl Mesh {
+    /// A mesh of one's own or another package's triangles or tetrahedra: pyvista.UnstructuredGrid, meshio.Mesh, a mesh of
+    /// scikit-fem, or (points, cells). Groups of facets, regions and values are kept. Cells that are oriented the other way
+    /// are turned, with a note.
+    ///
+    /// Parameters
+    /// ----------
+    /// obj : object
+    ///     One of these. Points have 2 or 3 coordinates; triangles whose points have three must lie in a plane of constant z.
+    ///
+    /// Returns
+    /// -------
+    /// Mesh
+    ///
+    /// Examples
+    /// --------
+    /// >>> import atomesh as am
+    /// >>> am.Mesh.of(([(0, 0), (1, 0), (1, 1), (0, 1)], [(0, 1, 2), (0, 2, 3)])).quality()["cells"]
+    /// 2
+    #[classmethod]
+    #[pyo3(name = "of")]
+    fn of_object(_: &Bound<'_, PyType>, obj: &Bound<'_, PyAny>) -> PyResult<Self> {
+        let py = obj.py();
+        let parts = py.import("atomesh._interop")?.call_method1("mesh_parts", (obj,))?;
+        let parts: GivenMesh<'_> = parts.extract()?;
+        let axes: usize = parts.points.getattr("shape")?.get_item(1)?.extract()?;
+        let (body, notes) = match axes {
+            2 => given(py, &parts, Dimension::plane())?,
+            _ => given(py, &parts, Dimension::space())?,
+        };
+        errors::warn(py, &notes)?;
+        let mesh = Self::new(py, body, notes.iter().map(errors::words).collect())?;
+        for (name, values) in parts.cell_data {
+            mesh.cell_data.bind(py).set_item(name, values)?;
+        }
+        Ok(mesh)
+    }
+
     /// The points, shape (n, D), float64, world coordinates x first; read-only and without a copy. Of Voronoi cells: their
     /// corners.
     #[getter]
@@ -595,7 +634,7 @@ impl Mesh {
         interop(slf, "to_meshio")
     }
 
-    /// The mesh for `pyvista`, with values; `region` and the groups of facets each cell touches are among them.
+    /// The mesh for `pyvista`, with its values and regions; a group of facets is had by `surface(name).to_pyvista()`.
     ///
     /// Returns
     /// -------
@@ -640,6 +679,80 @@ impl Mesh {
         let points = body.points().len() / self.dim();
         format!("Mesh({}: {points} points, {} cells)", body.cells_name(), body.cell_count())
     }
+}
+
+/// A mesh of another's making, as `_interop.mesh_parts` takes it apart.
+#[derive(FromPyObject)]
+struct GivenMesh<'py> {
+    points: Bound<'py, PyAny>,
+    cells: Bound<'py, PyAny>,
+    facets: Vec<(String, Bound<'py, PyAny>)>,
+    regions: Option<Vec<i32>>,
+    region_names: Vec<(i32, String)>,
+    point_data: Vec<(String, Bound<'py, PyAny>)>,
+    cell_data: Vec<(String, Bound<'py, PyAny>)>,
+}
+
+/// The mesh of such parts.
+fn given<const D: usize>(
+    py: Python<'_>,
+    parts: &GivenMesh<'_>,
+    dimension: Dimension<D>,
+) -> PyResult<(Box<dyn Body>, Vec<Note>)> {
+    let refused = |e: &dyn std::fmt::Display| errors::input(py, e);
+    let numbers = |given: &Bound<'_, PyAny>, corners: usize| -> PyResult<Vec<u32>> {
+        let rows = arrays::indices(given)?;
+        match rows.shape()[..] {
+            [_, columns] if columns == corners => Ok(rows.iter().copied().collect()),
+            ref other => {
+                let message =
+                    format!("cells or facets of shape {other:?}; expected (m, {corners})");
+                Err(errors::input(py, message))
+            }
+        }
+    };
+    let points = arrays::points::<D>(&parts.points)?;
+    let corners = numbers(&parts.cells, D + 1)?;
+    let mesh = CoreMesh::new(points, corners.clone()).map_err(|e| refused(&e))?;
+    let mesh = atomesh_job::mesh_file::oriented(mesh);
+    let cells = mesh.corners().chunks(D + 1).zip(corners.chunks(D + 1));
+    let turned = cells.filter(|(now, before)| now != before).count();
+    let mut notes = Vec::new();
+    if turned > 0 {
+        let text = format!(
+            "{turned} of {} cells are oriented the other way; they are turned",
+            mesh.cell_count()
+        );
+        notes.push(Note { kind: NoteKind::Change, file: None, text });
+    }
+    let mut groups = Vec::new();
+    for (number, (name, facets)) in parts.facets.iter().enumerate() {
+        let facets = numbers(facets, D)?.as_chunks::<D>().0.to_vec();
+        groups.push(FacetGroup { id: number as u32 + 1, name: name.clone(), facets });
+    }
+    let names = parts.region_names.clone();
+    let regions = parts.regions.clone().map(|of_cells| Regions { of_cells, names });
+    let tags = Tags::new(&mesh, groups, regions).map_err(|e| refused(&e))?;
+    let mut point_fields = Vec::new();
+    for (name, values) in &parts.point_data {
+        let values: Vec<f32> = arrays::numbers(values)?.into_iter().map(|v| v as f32).collect();
+        if values.len() != mesh.points().len() {
+            let message =
+                format!("{} values {name:?} at {} points", values.len(), mesh.points().len());
+            return Err(errors::input(py, message));
+        }
+        point_fields.push(OwnedField { name: name.clone(), values });
+    }
+    let loaded = LoadedMesh {
+        mesh,
+        point_fields,
+        tags,
+        cell_fields: Vec::new(),
+        frame: None,
+        provenance: None,
+        skipped_cells: 0,
+    };
+    Ok((Box::new(SimplexBody::new(loaded, None, dimension)), notes))
 }
 
 /// Calls a function of the package's that needs others' packages.

@@ -54,7 +54,7 @@ def _of_simpleitk(image):
     # a view keeps the image alive and is read-only
     array = SimpleITK.GetArrayViewFromImage(image)
     direction = np.reshape(image.GetDirection(), (axes, axes))
-    return Image(array, image.GetSpacing(), image.GetOrigin(), direction)
+    return _in_ras(array, image.GetSpacing(), image.GetOrigin(), direction)
 
 
 def _of_itk(image):
@@ -67,7 +67,13 @@ def _of_itk(image):
     if array.ndim != axes:
         raise _input(f"an image of {array.shape[-1]} components a sample; expected one")
     direction = itk.GetArrayFromMatrix(image.GetDirection())
-    return Image(array, list(image.GetSpacing()), list(image.GetOrigin()), direction)
+    return _in_ras(array, list(image.GetSpacing()), list(image.GetOrigin()), direction)
+
+
+def _in_ras(array, spacing, origin, direction):
+    """An image of ITK's: a volume's world is LPS, and is turned by half about z, as `read` turns what ITK writes."""
+    turn = np.array([-1.0, -1.0, 1.0]) if array.ndim == 3 else np.ones(2)
+    return Image(array, spacing, turn * np.asarray(origin), turn[:, None] * np.asarray(direction))
 
 
 def _of_nibabel(image):
@@ -76,8 +82,7 @@ def _of_nibabel(image):
         array = array[..., 0]
     if array.ndim != 3:
         raise _input(f"an image of shape {array.shape}; expected three axes: choose one volume")
-    # x and y of the world point the other way in ITK's and DICOM's, which `read` has too
-    affine = np.diag([-1.0, -1.0, 1.0, 1.0]) @ np.asarray(image.affine, float)
+    affine = np.asarray(image.affine, float)
     spacing = np.linalg.norm(affine[:3, :3], axis=0)
     if not (np.isfinite(affine).all() and (spacing > 0).all()):
         raise _input("an image whose affine is no placement")
@@ -254,6 +259,119 @@ def to_skfem(mesh):
     if mesh.regions is not None:
         subdomains = {name: np.flatnonzero(mesh.regions == number) for number, name in mesh.region_names.items()}
     return made.with_boundaries(boundaries) if subdomains is None else made.with_boundaries(boundaries).with_subdomains(subdomains)
+
+
+class _Parts:
+    """A mesh of triangles or tetrahedra as arrays and lists of pairs."""
+
+    def __init__(self, points, cells):
+        self.points = np.ascontiguousarray(points, float)
+        self.cells = np.ascontiguousarray(cells, np.int64)
+        self.facets, self.point_data, self.cell_data, self.region_names = [], [], [], []
+        self.regions = None
+
+    def flat(self):
+        """Triangles in a plane of constant z have two coordinates."""
+        if self.cells.shape[1:] == (3,) and self.points.shape[1:] == (3,):
+            used = self.points[np.unique(self.cells), 2] if len(self.cells) else self.points[:, 2]
+            if len(used) and np.ptp(used) > 1e-9 * np.abs(self.points).max():
+                raise _input("triangles in space; expected tetrahedra, or triangles in a plane of constant z")
+            self.points = np.ascontiguousarray(self.points[:, :2])
+        return self
+
+
+def mesh_parts(obj):
+    """The points, cells, groups of facets, regions and values of another package's mesh."""
+    if isinstance(obj, (tuple, list)) and len(obj) == 2:
+        return _Parts(*obj).flat()
+    for package, kind, convert in (
+        ("pyvista", "UnstructuredGrid", _parts_of_pyvista),
+        ("meshio", "Mesh", _parts_of_meshio),
+        ("skfem", "Mesh", _parts_of_skfem),
+    ):
+        module = _loaded(package)
+        if module is not None and isinstance(obj, getattr(module, kind, ())):
+            return convert(obj)
+    raise TypeError(
+        f"{type(obj).__module__}.{type(obj).__qualname__} is no mesh that is known; expected (points, cells), or a mesh of "
+        "pyvista, meshio or scikit-fem"
+    )
+
+
+def _scalars(data):
+    return [(name, np.asarray(values)) for name, values in data.items() if np.ndim(values) == 1 and np.asarray(values).dtype.kind in "biuf"]
+
+
+def _parts_of_pyvista(grid):
+    import pyvista
+
+    types = pyvista.CellType
+    volume, plane = grid.celltypes == types.TETRA, grid.celltypes == types.TRIANGLE
+    kind, taken = (types.TETRA, volume) if volume.any() else (types.TRIANGLE, plane)
+    if not taken.any():
+        raise _input("a grid without triangles or tetrahedra")
+    parts = _Parts(grid.points, grid.cells_dict[kind])
+    parts.point_data = _scalars(grid.point_data)
+    for name, values in _scalars(grid.cell_data):
+        if name == "region":
+            parts.regions = values[taken].astype(np.int32).tolist()
+        else:
+            parts.cell_data.append((name, values[taken]))
+    return parts.flat()
+
+
+def _parts_of_meshio(mesh):
+    kinds = {block.type for block in mesh.cells}
+    kind, facet = ("tetra", "triangle") if "tetra" in kinds else ("triangle", "line")
+    if kind not in kinds:
+        raise _input(f"a mesh of {', '.join(sorted(kinds)) or 'no cells'}; expected triangles or tetrahedra")
+    taken = [i for i, block in enumerate(mesh.cells) if block.type == kind]
+    parts = _Parts(mesh.points, np.concatenate([mesh.cells[i].data for i in taken]))
+    parts.point_data = _scalars(mesh.point_data)
+    for name, blocks in mesh.cell_data.items():
+        values = np.concatenate([np.asarray(blocks[i]) for i in taken])
+        if values.ndim != 1:
+            continue
+        if name == "region":
+            parts.regions = values.astype(np.int32).tolist()
+        else:
+            parts.cell_data.append((name, values))
+    regions = np.zeros(len(parts.cells), np.int32)
+    starts = dict(zip(taken, np.cumsum([0, *(len(mesh.cells[i].data) for i in taken)]).tolist()))
+    number = 0
+    for name, blocks in mesh.cell_sets.items():
+        facets = [mesh.cells[i].data[np.asarray(at, np.int64)] for i, at in enumerate(blocks)
+                  if at is not None and mesh.cells[i].type == facet and len(at)]
+        if facets:
+            parts.facets.append((name, np.concatenate(facets)))
+        cells = [starts[i] + np.asarray(at, np.int64) for i, at in enumerate(blocks)
+                 if at is not None and i in starts and len(at)]
+        if cells:
+            cells = np.concatenate(cells)
+            if parts.regions is not None:
+                known = np.unique(np.asarray(parts.regions)[cells])
+                if len(known) == 1:
+                    parts.region_names.append((int(known[0]), name))
+                continue
+            number += 1
+            regions[cells] = number
+            parts.region_names.append((number, name))
+    if number:
+        parts.regions = regions.tolist()
+    return parts.flat()
+
+
+def _parts_of_skfem(mesh):
+    parts = _Parts(mesh.p.T, mesh.t[: mesh.p.shape[0] + 1].T)
+    for name, facets in (mesh.boundaries or {}).items():
+        parts.facets.append((name, mesh.facets[:, np.asarray(facets)].T))
+    if mesh.subdomains:
+        regions = np.zeros(mesh.t.shape[1], np.int32)
+        for number, (name, cells) in enumerate(mesh.subdomains.items(), start=1):
+            regions[np.asarray(cells)] = number
+            parts.region_names.append((number, name))
+        parts.regions = regions.tolist()
+    return parts
 
 
 def plot(mesh):
