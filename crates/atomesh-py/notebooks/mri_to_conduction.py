@@ -68,16 +68,14 @@ scan.header.set_xyzt_units("mm")
 # %% [markdown]
 # ## Frames
 #
-# `Image.of` takes frame and order of axes from the object. Arrays of atomesh are z, y, x, and coordinates x first. Those of
-# an image of nibabel's are turned to LPS (left, posterior, superior), where ITK and DICOM have them: x and y change their
-# signs.
+# `Image.of` takes frame and order of axes from the object. Arrays of atomesh are z, y, x, and coordinates x first, in RAS
+# as nibabel's; volumes of SimpleITK, which has them in LPS (left, posterior, superior), are turned.
 
 # %%
-TO_WORLD = np.array([-1, -1, 1])  # RAS to LPS
 image, labels = am.Image.of(scan), am.Image.of(segmentation)
 assert image.array.shape == SHAPE[::-1] and image.shape == SHAPE
 assert np.allclose(image.spacing, ZOOMS) and image.units == ["mm"] * 3
-assert np.allclose(image.origin, affine[:3, 3] * TO_WORLD)
+assert np.allclose(image.origin, affine[:3, 3])
 
 # SimpleITK reads the same file to the same places
 nib.save(scan, "scan.nii.gz")
@@ -97,14 +95,13 @@ mesh = am.mesh(image, size=6, features="edges", labels=labels)
 mesh
 
 # %%
-centre = CENTRE * TO_WORLD
 volumes = np.abs(np.linalg.det(mesh.points[mesh.cells][:, 1:] - mesh.points[mesh.cells][:, :1])) / 6
 print(f"{mesh.cell_count} tetrahedra; regions {mesh.region_names}")
 for name, wanted, share in (
     ("interface-0-1", ORGAN, volumes[mesh.regions > 0].sum()),
     ("interface-1-2", CORE, volumes[mesh.regions == 2].sum()),
 ):
-    on = np.linalg.norm(mesh.points[np.unique(mesh.facets[name])] - centre, axis=1)
+    on = np.linalg.norm(mesh.points[np.unique(mesh.facets[name])] - CENTRE, axis=1)
     ratio = share / (4 / 3 * np.pi * wanted**3)
     print(f"{name}: {np.mean(np.abs(on - wanted) < 0.8):.1%} of its points within 0.8 mm of r = {wanted}; volume {ratio:.3f}")
     assert np.mean(np.abs(on - wanted) < 0.8) > 0.9
@@ -184,10 +181,10 @@ mask = am.Image((labels.array > 0).astype(np.uint8), labels.spacing, labels.orig
 with warnings.catch_warnings():
     warnings.simplefilter("ignore", am.AtomeshWarning)  # flat cells near the outline
     alone = am.mesh(image, size=6, features="none", mask=mask)
-outline = np.linalg.norm(alone.points[np.unique(alone.facets["mask"])] - centre, axis=1)
+outline = np.linalg.norm(alone.points[np.unique(alone.facets["mask"])] - CENTRE, axis=1)
 print(f"{alone.cell_count} tetrahedra; the outline at r = {outline.min():.2f} to {outline.max():.2f}")
 assert abs(outline - ORGAN).max() < 1.2
-assert (np.linalg.norm(alone.points - centre, axis=1) < ORGAN + 1.2).all()
+assert (np.linalg.norm(alone.points - CENTRE, axis=1) < ORGAN + 1.2).all()
 
 # %% [markdown]
 # ## Your own scan

@@ -73,7 +73,8 @@ def _of_itk(image):
 def _in_ras(array, spacing, origin, direction):
     """An image of ITK's: a volume's world is LPS, and is turned by half about z, as `read` turns what ITK writes."""
     turn = np.array([-1.0, -1.0, 1.0]) if array.ndim == 3 else np.ones(2)
-    return Image(array, spacing, turn * np.asarray(origin), turn[:, None] * np.asarray(direction))
+    # + 0: no -0, which would be printed with its sign
+    return Image(array, spacing, turn * np.asarray(origin) + 0, turn[:, None] * np.asarray(direction) + 0)
 
 
 def _of_nibabel(image):
