@@ -4,6 +4,7 @@ mod body;
 mod cells;
 mod simplices;
 
+use std::collections::BTreeMap;
 use std::path::PathBuf;
 use std::sync::Arc;
 
@@ -15,7 +16,7 @@ use atomesh_io::mesh::{LoadedMesh, OwnedField};
 use atomesh_job::mesh::{MadeMesh, MeshImages, ShownImage, prepare, read_shown};
 use atomesh_job::options::{OutputOptions, RunConfig};
 use atomesh_job::sample::Property;
-use atomesh_job::{Dimension, JobError, Note, NoteKind, Session};
+use atomesh_job::{Dimension, JobError, Session};
 use pyo3::exceptions::{PyKeyError, PyTypeError};
 use pyo3::prelude::*;
 use pyo3::types::{PyBytes, PyDict, PyMapping, PyType};
@@ -157,15 +158,12 @@ impl Mesh {
         let parts = py.import("atomesh._interop")?.call_method1("mesh_parts", (obj,))?;
         let parts: GivenMesh<'_> = parts.extract()?;
         let axes: usize = parts.points.getattr("shape")?.get_item(1)?.extract()?;
-        let (body, notes) = match axes {
+        let body = match axes {
             2 => given(py, &parts, Dimension::plane())?,
             _ => given(py, &parts, Dimension::space())?,
         };
-        errors::warn(py, &notes)?;
-        let mesh = Self::new(py, body, notes.iter().map(errors::words).collect())?;
-        for (name, values) in parts.cell_data {
-            mesh.cell_data.bind(py).set_item(name, values)?;
-        }
+        let mesh = Self::new(py, body, Vec::new())?;
+        mesh.cell_data.bind(py).update(parts.cell_data.as_mapping())?;
         Ok(mesh)
     }
 
@@ -280,7 +278,7 @@ impl Mesh {
 
     /// The names of the regions by number.
     #[getter]
-    fn region_names(&self) -> std::collections::BTreeMap<i32, String> {
+    fn region_names(&self) -> BTreeMap<i32, String> {
         let Some(regions) = self.body().regions() else { return Default::default() };
         regions.ids().into_iter().map(|id| (id, regions.name(id))).collect()
     }
@@ -686,11 +684,11 @@ impl Mesh {
 struct GivenMesh<'py> {
     points: Bound<'py, PyAny>,
     cells: Bound<'py, PyAny>,
-    facets: Vec<(String, Bound<'py, PyAny>)>,
+    facets: Bound<'py, PyDict>,
     regions: Option<Vec<i32>>,
-    region_names: Vec<(i32, String)>,
-    point_data: Vec<(String, Bound<'py, PyAny>)>,
-    cell_data: Vec<(String, Bound<'py, PyAny>)>,
+    region_names: BTreeMap<i32, String>,
+    point_data: Bound<'py, PyDict>,
+    cell_data: Bound<'py, PyDict>,
 }
 
 /// The mesh of such parts.
@@ -698,7 +696,7 @@ fn given<const D: usize>(
     py: Python<'_>,
     parts: &GivenMesh<'_>,
     dimension: Dimension<D>,
-) -> PyResult<(Box<dyn Body>, Vec<Note>)> {
+) -> PyResult<Box<dyn Body>> {
     let refused = |e: &dyn std::fmt::Display| errors::input(py, e);
     let numbers = |given: &Bound<'_, PyAny>, corners: usize| -> PyResult<Vec<u32>> {
         let rows = arrays::indices(given)?;
@@ -712,36 +710,19 @@ fn given<const D: usize>(
         }
     };
     let points = arrays::points::<D>(&parts.points)?;
-    let corners = numbers(&parts.cells, D + 1)?;
-    let mesh = CoreMesh::new(points, corners.clone()).map_err(|e| refused(&e))?;
-    let mesh = atomesh_job::mesh_file::oriented(mesh);
-    let cells = mesh.corners().chunks(D + 1).zip(corners.chunks(D + 1));
-    let turned = cells.filter(|(now, before)| now != before).count();
-    let mut notes = Vec::new();
-    if turned > 0 {
-        let text = format!(
-            "{turned} of {} cells are oriented the other way; they are turned",
-            mesh.cell_count()
-        );
-        notes.push(Note { kind: NoteKind::Change, file: None, text });
-    }
+    let mesh = CoreMesh::new(points, numbers(&parts.cells, D + 1)?).map_err(|e| refused(&e))?;
     let mut groups = Vec::new();
-    for (number, (name, facets)) in parts.facets.iter().enumerate() {
-        let facets = numbers(facets, D)?.as_chunks::<D>().0.to_vec();
-        groups.push(FacetGroup { id: number as u32 + 1, name: name.clone(), facets });
+    for (number, (name, facets)) in (1..).zip(&parts.facets) {
+        let facets = numbers(&facets, D)?.as_chunks::<D>().0.to_vec();
+        groups.push(FacetGroup { id: number, name: name.extract()?, facets });
     }
-    let names = parts.region_names.clone();
+    let names = parts.region_names.clone().into_iter().collect();
     let regions = parts.regions.clone().map(|of_cells| Regions { of_cells, names });
     let tags = Tags::new(&mesh, groups, regions).map_err(|e| refused(&e))?;
     let mut point_fields = Vec::new();
     for (name, values) in &parts.point_data {
-        let values: Vec<f32> = arrays::numbers(values)?.into_iter().map(|v| v as f32).collect();
-        if values.len() != mesh.points().len() {
-            let message =
-                format!("{} values {name:?} at {} points", values.len(), mesh.points().len());
-            return Err(errors::input(py, message));
-        }
-        point_fields.push(OwnedField { name: name.clone(), values });
+        let values = arrays::numbers(&values)?.into_iter().map(|v| v as f32).collect();
+        point_fields.push(OwnedField { name: name.extract()?, values });
     }
     let loaded = LoadedMesh {
         mesh,
@@ -752,7 +733,7 @@ fn given<const D: usize>(
         provenance: None,
         skipped_cells: 0,
     };
-    Ok((Box::new(SimplexBody::new(loaded, None, dimension)), notes))
+    Ok(Box::new(SimplexBody::new(loaded, None, dimension)))
 }
 
 /// Calls a function of the package's that needs others' packages.

@@ -1,11 +1,15 @@
 """What notebooks show: one picture and a few numbers, without scripts."""
 
 import base64
+from collections.abc import Callable, Sequence
 
-_LARGEST = 75_000  # bytes of a picture, a third less than its text
+from ._atomesh import Flow, Mesh
+from ._errors import InputError
+
+_LARGEST = 73_000  # bytes of a picture, whose text is a third longer
 
 
-def _figure(png, rows):
+def _figure(png: bytes | None, rows: Sequence[tuple[str, str]]) -> str:
     cells = "".join(
         f"<tr><th style='text-align:left'>{name}</th><td style='text-align:right'>{value}</td></tr>" for name, value in rows
     )
@@ -13,8 +17,8 @@ def _figure(png, rows):
     return f"<div>{image}<table>{cells}</table></div>"
 
 
-def _small(draw):
-    """A picture of at most so many bytes; none where there is no image to draw on."""
+def _small(draw: Callable[[int], bytes]) -> bytes | None:
+    """A picture of at most so many bytes; none where even a small one is larger."""
     for side in (480, 360, 240, 160):
         png = draw(side)
         if len(png) <= _LARGEST:
@@ -22,10 +26,8 @@ def _small(draw):
     return None
 
 
-def html(mesh):
+def html(mesh: Mesh) -> str:
     """A mesh with its picture."""
-    from . import InputError
-
     try:
         png = _small(lambda side: mesh.picture(max_side=side))
     except InputError:
@@ -39,7 +41,7 @@ def html(mesh):
     return _figure(png, rows)
 
 
-def flow_html(flow):
+def flow_html(flow: Flow) -> str:
     """A flow with its picture."""
     balance = flow.balance
     rows = [(name, f"{balance[name]:.6g}") for name in ("wells_in", "wells_out", "boundary_in", "boundary_out", "error")]

@@ -2,17 +2,21 @@
 
 import sys
 import time
+from collections.abc import Callable
+from typing import Any, TextIO
+
+from ._atomesh import Event
 
 
 class Line:
     """Writes phase and share done, on a terminal over and over on one line, elsewhere once a phase."""
 
-    def __init__(self, to):
+    def __init__(self, to: TextIO) -> None:
         self._to = to
-        self._phase = None
+        self._phase: str | None = None
         self._said = 0.0
 
-    def __call__(self, event):
+    def __call__(self, event: Event) -> None:
         now = time.monotonic()
         is_new = event.phase != self._phase
         if not self._to.isatty():
@@ -24,7 +28,7 @@ class Line:
             self._said = now
         self._phase = event.phase
 
-    def close(self):
+    def close(self) -> None:
         """Leaves the line empty."""
         if self._to.isatty():
             print("\r\x1b[2K", end="", file=self._to, flush=True)
@@ -33,25 +37,25 @@ class Line:
 class Bar:
     """A bar of tqdm's for each phase."""
 
-    def __init__(self, tqdm):
+    def __init__(self, tqdm: Callable[..., Any]) -> None:
         self._tqdm = tqdm
-        self._bar = None
+        self._bar: Any = None
 
-    def __call__(self, event):
+    def __call__(self, event: Event) -> None:
         if self._bar is None or self._bar.desc != event.phase:
             self.close()
             self._bar = self._tqdm(total=100, desc=event.phase, leave=False, bar_format="{l_bar}{bar}")
         self._bar.n = 100 * event.done
         self._bar.refresh()
 
-    def close(self):
+    def close(self) -> None:
         """Takes the bar away."""
         if self._bar is not None:
             self._bar.close()
             self._bar = None
 
 
-def line():
+def line() -> Line | Bar:
     """What `progress=True` calls."""
     try:
         from tqdm.auto import tqdm
