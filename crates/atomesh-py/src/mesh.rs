@@ -11,11 +11,12 @@ use std::sync::Arc;
 use atomesh::image::{Frame, Image as CoreImage};
 use atomesh::mesh::{FacetGroup, Mesh as CoreMesh, Regions, Tags};
 use atomesh::run::Outcome;
+use atomesh_draw::{DrawError, Picture, PictureFormat};
 use atomesh_io::image::{AnyImage, LoadedImage};
 use atomesh_io::mesh::{LoadedMesh, OwnedField};
 use atomesh_job::mesh::{MadeMesh, MeshImages, ShownImage, prepare, read_shown};
 use atomesh_job::options::{OutputOptions, RunConfig};
-use atomesh_job::sample::Property;
+use atomesh_job::sample::{Property, SampledMesh};
 use atomesh_job::{Dimension, JobError, Session};
 use pyo3::exceptions::{PyKeyError, PyTypeError};
 use pyo3::prelude::*;
@@ -1001,6 +1002,41 @@ fn of_file(what: &str) -> JobError {
     JobError::misuse(format!("{what}() of a mesh that was read; expected the image too"))
 }
 
+/// The image that a picture of a mesh is drawn on: one that is given, or its own.
+fn backdrop<'a, const D: usize>(
+    given: Option<&'a CoreImage<D>>,
+    made: Option<&'a Made<D>>,
+) -> Result<&'a CoreImage<D>, JobError> {
+    given.or(made.map(|made| &made.image)).ok_or_else(|| of_file("picture"))
+}
+
+/// A picture as a PNG.
+fn png(picture: Result<Picture, DrawError>) -> Result<Vec<u8>, JobError> {
+    let png = picture.and_then(|picture| picture.encode(PictureFormat::Png));
+    png.map_err(JobError::content)
+}
+
+/// Writes a mesh: one that was made with all that the options name, one that was read alone.
+fn written<const D: usize>(
+    made: Option<&Made<D>>,
+    loaded: &impl SampledMesh<D>,
+    output: OutputOptions,
+    properties: &[Property],
+    dimension: &Dimension<D>,
+    session: &mut Session<'_>,
+) -> Result<(), JobError> {
+    if let Some(made) = made {
+        let run = RunConfig { output, ..made.run.clone() };
+        return made.as_job(&run, properties).write(dimension, session).map(drop);
+    }
+    let path = output_alone(output)?;
+    loaded.check_output(&path)?;
+    session.write_together(|group, session| {
+        let staged = atomesh_job::files::stage(&path, group)?;
+        loaded.write(&staged, properties, dimension, session)
+    })
+}
+
 /// The file of a mesh that was read, where nothing is to be written beside it.
 fn output_alone(output: OutputOptions) -> Result<PathBuf, JobError> {
     let path = output.output.clone().unwrap_or_default();
@@ -1014,7 +1050,7 @@ fn output_alone(output: OutputOptions) -> Result<PathBuf, JobError> {
 fn sampled<const D: usize>(
     request: &atomesh_job::sample::SampleRequest,
     name: &str,
-    loaded: &impl atomesh_job::sample::SampledMesh<D>,
+    loaded: &impl SampledMesh<D>,
     image: AnyImage,
     dimension: &Dimension<D>,
     session: &mut Session<'_>,

@@ -2,14 +2,14 @@
 
 use atomesh::image::Units;
 use atomesh::mesh::{FacetGroup, Regions};
-use atomesh_draw::{PictureFormat, Style};
+use atomesh_draw::Style;
 use atomesh_io::image::AnyImage;
 use atomesh_io::mesh::{LoadedMesh, OwnedField};
 use atomesh_job::features::FeaturesRequest;
 use atomesh_job::flow::{FlowMesh, FlowOptions};
 use atomesh_job::measure::{Against, MeasureRequest, measure};
 use atomesh_job::options::{OutputOptions, RunConfig};
-use atomesh_job::sample::{Property, SampleRequest, SampledMesh};
+use atomesh_job::sample::{Property, SampleRequest};
 use atomesh_job::surfaces::{SurfacesRequest, surfaces};
 use atomesh_job::{Dimension, JobError, Session, mesh_file};
 use serde_json::Value;
@@ -194,30 +194,17 @@ impl<const D: usize> Body for SimplexBody<D> {
         properties: &[Property],
         session: &mut Session<'_>,
     ) -> Result<(), JobError> {
-        if let Some(made) = &self.made {
-            let run = RunConfig { output, ..made.run.clone() };
-            return made.as_job(&run, properties).write(&self.dimension, session).map(drop);
-        }
-        let path = super::output_alone(output)?;
-        session.write_together(|group, session| {
-            let staged = atomesh_job::files::stage(&path, group)?;
-            self.loaded.write(&staged, properties, &self.dimension, session)
-        })
+        let Self { made, loaded, dimension, .. } = self;
+        super::written(made.as_ref(), loaded, output, properties, dimension, session)
     }
 
     fn picture(&self, image: Option<AnyImage>, max_side: f64) -> Result<Vec<u8>, JobError> {
-        let image = image.map(|image| in_dimension(image, &self.dimension)).transpose()?;
-        let image = match (&image, &self.made) {
-            (Some(image), _) => image,
-            (None, Some(made)) => &made.image,
-            (None, None) => return Err(of_file("picture")),
-        };
+        let given = image.map(|image| in_dimension(image, &self.dimension)).transpose()?;
+        let image = super::backdrop(given.as_ref(), self.made.as_ref())?;
         let frame = self.loaded.frame.as_ref().unwrap_or(image.frame());
         let mesh = (self.dimension.tools.lattice_mesh)(&self.loaded.mesh, frame, Units::Samples);
         let style = Style { max_side, ..Style::default() };
-        let picture = (self.dimension.drawing.mesh)(image, &mesh, &style);
-        let picture = picture.map_err(JobError::content)?;
-        picture.encode(PictureFormat::Png).map_err(JobError::content)
+        super::png((self.dimension.drawing.mesh)(image, &mesh, &style))
     }
 
     fn editor(&self, session: &mut Session<'_>) -> Result<Box<dyn EditorBody>, JobError> {
