@@ -68,7 +68,7 @@ pub use improved::Improved;
 pub use inputs::Inputs;
 pub use method::Method;
 pub use options::{LatticeKind, MeshKind, MeshOptions, POINTS_PER_WAVELENGTH, Size};
-pub use outcome::{Outcome, lattice_mesh, sides};
+pub use outcome::{Outcome, lattice_cells, lattice_mesh, sides};
 pub use prepared::Prepared;
 pub use report::{MeshReport, VoronoiReport};
 pub use settled::Settled;
