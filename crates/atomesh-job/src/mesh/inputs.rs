@@ -97,7 +97,9 @@ impl<const D: usize> MeshImages<D> {
         let of = Samples::of(&image, units, run).map_err(|e| e.about_any(shown))?;
         let image = images::place(image, &run.frame, shown, session)?;
         run.mesh_options::<D>()?;
-        memory::check_potential(image.samples().len(), "mesh").map_err(|e| e.about_any(shown))?;
+        // what makes b is forecast where it is made
+        memory::check_potential(image.samples().len(), 4.0, "mesh")
+            .map_err(|e| e.about_any(shown))?;
         let mut field = |path: Option<&Path>, kind: FieldKind| {
             path.map(|path| read_field(run, path, &of, kind, dimension, session)).transpose()
         };
@@ -242,7 +244,22 @@ fn read_field<const D: usize>(
         say(false, text);
     }
     let field = onto(field, run, path, of, between, &mut say).map_err(|e| e.about(path))?;
+    note_filled(&field, run, path, session);
     run.frame.place(field).map_err(|e| e.about(path))
+}
+
+/// Says how many samples of a field get the value of `--fill`.
+fn note_filled<const D: usize>(
+    field: &Image<D>,
+    run: &RunConfig,
+    path: &Path,
+    session: &mut Session<'_>,
+) {
+    let count = field.samples().range().nan_count;
+    if let Some(fill) = run.frame.fill.filter(|_| count > 0) {
+        let text = format!("{count} samples are NaN; they become {fill}");
+        session.note(Note { kind: NoteKind::Change, file: Some(path.into()), text });
+    }
 }
 
 /// The field at the samples of the image.

@@ -2,7 +2,7 @@
 
 use rayon::prelude::*;
 
-use crate::enhance::{EdgeOperator, FeatureOptions, Features};
+use crate::enhance::{EdgeOperator, FeatureOptions, Features, Mixture};
 use crate::fields::{Interpolation, NominalDistance, ScalarField};
 use crate::image::Grid;
 
@@ -121,6 +121,14 @@ pub(super) fn valley_bytes<const D: usize>(potential: &ScalarField<D>) -> f64 {
     let copies = if potential.interpolation() == Interpolation::Spline { 3.0 } else { 2.0 };
     let of_deep = 12.0 + 4.0 * (D + D * D) as f64;
     (4.0 * copies + LEFT_BYTES) * samples.len() as f64 + of_deep * deep as f64
+}
+
+/// Bytes a sample that making b takes at the peak, beside the image: b itself, and what finds features of these kinds.
+pub fn potential_bytes(mixture: &Mixture, options: &FeatureOptions) -> f64 {
+    let shares = mixture.shares();
+    let kinds = shares.iter().map(|share| FeatureOptions { features: share.features, ..*options });
+    let most = kinds.map(|kind| feature_bytes(&kind, shares.len() > 1)).fold(0.0, f64::max);
+    4.0 + most
 }
 
 /// Bytes a sample that looking for features takes at the peak beside the image and b; what is less than a copy of b is

@@ -62,7 +62,7 @@ pub use across::AcrossFeature;
 pub use connected::Connected;
 pub use divided::Divided;
 pub use error::{RunError, Warning};
-pub use estimate::Estimate;
+pub use estimate::{Estimate, potential_bytes};
 pub use filled::Filled;
 pub use improved::Improved;
 pub use inputs::Inputs;
