@@ -316,7 +316,7 @@ def run(task):
         outcome, wrong = classify(code, words, folder / output)
         if wrong is None and outcome == "mesh":
             floor = floor_of(given, dimension)
-            warned = "below --min-angle" in words
+            warned = "stay below the least angle" in words
             if "voronoi" in given:
                 wrong = judge_voronoi(folder / output, box)
             else:

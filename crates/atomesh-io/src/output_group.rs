@@ -199,7 +199,7 @@ impl Output {
                 for entry in fs::read_dir(&self.staged)? {
                     let entry = entry?;
                     let Place::File(place) = Place::of(&folder.join(entry.file_name()))? else {
-                        return Err(io::Error::other("it holds what is no file"));
+                        return Err(io::Error::other("it holds something that is not a file"));
                     };
                     done.push(Move::of(&entry.path(), &place, room)?);
                 }

@@ -5,6 +5,7 @@ use std::path::PathBuf;
 use atomesh::enhance::{Enhanced, FeatureOptions, Mixture};
 use atomesh::image::{Image, Samples, Units};
 use atomesh::mesh::Mesh;
+use atomesh::run::potential_bytes;
 use atomesh::watch::{Phase, check};
 use atomesh_draw::{Picture, Style};
 use atomesh_io::image::{AnyImage, Meaning};
@@ -76,16 +77,21 @@ pub fn enhance<const D: usize>(
     dimension: &Dimension<D>,
     session: &mut Session<'_>,
 ) -> Result<Potential<D>, JobError> {
+    let (mixture, options) = wanted(features, units);
+    let made = (dimension.tools.enhance_mixture)(&mixture, &options, image, session)?;
+    let Enhanced { values, constant, .. } = made;
+    let image = Image::new(*image.frame(), Samples::F32(values.into())).map_err(JobError::content)?;
+    Ok(Potential { image, mixture, is_constant: constant })
+}
+
+/// The kinds of features that options ask for, and how they are looked for.
+fn wanted(features: &PotentialOptions, units: Units) -> (Mixture, FeatureOptions) {
     let options = features.feature_options(FeatureOptions { units, ..Default::default() });
     let mixture = match &features.features {
         Some(mixture) => mixture.0.clone(),
         None => Mixture::from(options.features),
     };
-    let made = (dimension.tools.enhance_mixture)(&mixture, &options, image, session)?;
-    let Enhanced { values, constant, .. } = made;
-    let image =
-        Image::new(*image.frame(), Samples::F32(values.into())).map_err(JobError::content)?;
-    Ok(Potential { image, mixture, is_constant: constant })
+    (mixture, options)
 }
 
 /// Enhances a file and writes the potential.
@@ -120,9 +126,10 @@ fn run<const D: usize>(
     session: &mut Session<'_>,
 ) -> Result<EnhanceSummary, JobError> {
     let image = images::place(image, &request.frame, Some(&request.image), session)?;
-    memory::check_potential(image.samples().len(), "enhance")
-        .map_err(|e| e.about(&request.image))?;
     let units = request.units.unwrap_or_default();
+    let (mixture, options) = wanted(&request.features, units);
+    memory::check_potential(image.samples().len(), potential_bytes(&mixture, &options), "enhance")
+        .map_err(|e| e.about(&request.image))?;
     let potential = enhance(&image, &request.features, units, dimension, session)
         .map_err(|e| e.about_content(&request.image))?;
     if potential.is_constant {

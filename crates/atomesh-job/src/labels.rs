@@ -64,8 +64,7 @@ pub(crate) fn whole(any: AnyImage) -> Result<(AnyImage, Vec<Oddity>), JobError> 
 pub(crate) fn of_image<const D: usize>(
     image: Image<D>,
 ) -> Result<(Image<D>, Vec<Oddity>), JobError> {
-    let absent = image.absent().map(<[bool]>::to_vec);
-    let (frame, mut samples) = image.into_parts();
+    let mut samples = image.samples().clone();
     let most = match &mut samples {
         Samples::F32(values) => round(values, |v| f64::from(v.fract()), f32::round),
         Samples::F64(values) => round(values, |v| v.fract(), f64::round),
@@ -73,10 +72,7 @@ pub(crate) fn of_image<const D: usize>(
     };
     let rounded = (most > 0.0).then_some(Oddity::Rounded { most });
     let many = are_many(&samples).then_some(Oddity::Many);
-    let mut image = Image::new(frame, samples).map_err(JobError::content)?;
-    if let Some(absent) = absent {
-        image = image.with_absent(absent).map_err(JobError::content)?;
-    }
+    let image = image.with_samples(samples).map_err(JobError::content)?;
     Ok((image, rounded.into_iter().chain(many).collect()))
 }
 

@@ -85,9 +85,14 @@ pub(crate) fn check_file(path: &Path) -> Result<(), JobError> {
     Err(JobError::memory(message).about(path))
 }
 
-/// Refuses an image whose potential, four bytes a sample, does not fit; `verb` is what may be done to a part of it.
-pub(crate) fn check_potential(sample_count: usize, verb: &str) -> Result<(), JobError> {
-    let needed = 4 * sample_count as u64;
+/// Refuses an image whose potential, so many bytes a sample with what it is made of, does not fit; `verb` is what may be
+/// done to a part of it.
+pub(crate) fn check_potential(
+    sample_count: usize,
+    bytes_each: f64,
+    verb: &str,
+) -> Result<(), JobError> {
+    let needed = (bytes_each * sample_count as f64) as u64;
     let Some(available) = lack(needed) else { return Ok(()) };
     let (needed, available) = (text(needed), text(available));
     let message = format!("the potential needs {needed} of memory; {available} are left");

@@ -89,16 +89,15 @@ pub(crate) fn cells_refusal(error: CellReadError, path: &Path) -> JobError {
     .about(path)
 }
 
-/// The refusal of Voronoi cells where triangles or tetrahedra alone make sense.
-pub(crate) fn simplices_only(path: &Path, what: &str, advice: &str) -> JobError {
-    let message = format!("holds Voronoi cells; {what} triangles and tetrahedra alone");
-    JobError::misuse(message).about(path).advise(advice)
-}
-
 /// The lattice units in which a mesh was made.
 pub(crate) fn units(provenance: Option<&Provenance>) -> Option<Units> {
     let units = provenance?.options.get("lattice")?.get("units")?;
     serde_json::from_value(units.clone()).ok()
+}
+
+/// The nominal distance that a mesh was made with, if it was one for the whole mesh.
+pub(crate) fn size(provenance: &Provenance) -> Option<f64> {
+    provenance.options.get("lattice")?.get("size")?.as_f64()
 }
 
 /// The sides of the image's box, or of the mesh's own where the image is not known.

@@ -2,6 +2,7 @@
 
 use std::path::{Path, PathBuf};
 
+use atomesh::features::FeatureFaces;
 use atomesh::mesh::{FacetGroup, Mesh, PolyMesh, Regions, Tags, feature_name, side_name};
 use atomesh::region::closed_surface;
 use atomesh_io::mesh::LoadedMesh;
@@ -205,17 +206,28 @@ pub fn groups_of_cells<const D: usize>(loaded: &LoadedCells<D>) -> Vec<FacetGrou
         facets: mesh.side(side).flat_map(|face| mesh.face_parts(face)).collect(),
     };
     let mut groups: Vec<FacetGroup<D>> = (0..2 * D).map(side).collect();
-    for number in 1..=features.areas.len() as u32 {
-        let own = features.of_faces.iter().enumerate().filter(|(_, of)| **of == number);
-        let facets = own.flat_map(|(face, _)| mesh.face_parts(face)).collect();
-        groups.push(FacetGroup { id: 2 * D as u32 + number, name: feature_name(number), facets });
-    }
+    let after_sides = |group: FacetGroup<D>| FacetGroup { id: 2 * D as u32 + group.id, ..group };
+    groups.extend(feature_groups(mesh, features).into_iter().map(after_sides));
     groups.retain(|group| !group.facets.is_empty());
     groups
 }
 
+/// The features of Voronoi cells, numbered from 1; polygons are cut into triangles from their first points.
+pub(crate) fn feature_groups<const D: usize>(
+    cells: &PolyMesh<D>,
+    features: &FeatureFaces,
+) -> Vec<FacetGroup<D>> {
+    let mut groups: Vec<FacetGroup<D>> = (1..=features.areas.len() as u32)
+        .map(|id| FacetGroup { id, name: feature_name(id), facets: Vec::new() })
+        .collect();
+    for (face, &number) in features.of_faces.iter().enumerate().filter(|(_, of)| **of > 0) {
+        groups[number as usize - 1].facets.extend(cells.face_parts(face));
+    }
+    groups
+}
+
 /// The points of cells, as surface files take them.
-fn points_of<const D: usize>(cells: &PolyMesh<D>) -> Result<Mesh<D>, JobError> {
+pub(crate) fn points_of<const D: usize>(cells: &PolyMesh<D>) -> Result<Mesh<D>, JobError> {
     Mesh::new(cells.points().to_vec(), Vec::new()).map_err(JobError::content)
 }
 

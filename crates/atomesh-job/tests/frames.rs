@@ -187,3 +187,16 @@ fn labels_a_rounding_off_are_rounded_and_the_note_says_how_far() {
     assert_ne!(labels.samples().to_f32(), whole.samples().to_f32());
     assert!(notes.is_empty(), "{notes:?}");
 }
+
+#[test]
+fn nan_that_a_value_replaces_is_noted_in_labels_too() {
+    let case = Case::new();
+    let (frame, samples) = ball(frame([16, 14, 12], [-8.0, -6.0, -5.0])).into_parts();
+    let mut labels = samples.to_f32();
+    labels[5..8].fill(f32::NAN);
+    let path = case.write("holes.nrrd", &Image::new(frame, Samples::F32(labels)).unwrap());
+    let (labels, notes) = case.read(&path, |run| run.frame.fill = Some(7.0)).unwrap();
+    assert_eq!(labels.samples().get(6), 7.0);
+    assert!(notes[0].ends_with("3 samples are NaN; they become 7"), "{notes:?}");
+    assert!(case.read(&path, |_| {}).is_err());
+}

@@ -4,7 +4,6 @@ use std::fmt::Write;
 use std::path::PathBuf;
 use std::time::Duration;
 
-use atomesh::improve::ImproveReport;
 use atomesh::measure::ShapeReport;
 use atomesh::mesh::PolyReport;
 use atomesh_job::files::shown;
@@ -104,7 +103,7 @@ fn summary(made: &MeshSummary, time: Duration) -> String {
         let recall = figures.voronoi_alignment.as_ref().and_then(|a| a.recall);
         voronoi_figures(shape, recall, made.cells)
     } else if let Some(shape) = &figures.shape {
-        simplex_figures(shape, made.improved.as_ref(), made.cells)
+        simplex_figures(shape, made.cells)
     } else {
         return text;
     };
@@ -122,12 +121,9 @@ fn voronoi_figures(shape: &PolyReport, recall: Option<f64>, cells: &str) -> Stri
     )
 }
 
-fn simplex_figures(shape: &ShapeReport, improved: Option<&ImproveReport>, cells: &str) -> String {
-    let below = improved.filter(|report| !report.floor_held).map_or_else(String::new, |report| {
-        format!(" ({} {cells} below --min-angle)", report.below)
-    });
+fn simplex_figures(shape: &ShapeReport, cells: &str) -> String {
     format!(
-        "{} points, {} {cells}; quality mean {:.3}, least {:.3}; least angle {:.1}°{below}",
+        "{} points, {} {cells}; quality mean {:.3}, least {:.3}; least angle {:.1}°",
         shape.points, shape.cells, shape.q_mean, shape.q_min, shape.angle_min,
     )
 }

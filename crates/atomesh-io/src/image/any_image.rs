@@ -73,8 +73,8 @@ impl AnyImage {
         self.samples().type_name()
     }
 
-    /// The least and greatest sample, and the count of those that are not finite.
+    /// The least and greatest sample that has data, and the count of those that are not finite.
     pub fn range(&self) -> Range {
-        self.samples().range()
+        either!(self, i => i.range())
     }
 }

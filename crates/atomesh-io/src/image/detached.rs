@@ -44,7 +44,7 @@ impl DataFolders<'_> {
         }
         let metadata = fs::metadata(&path).map_err(failure)?;
         if !metadata.is_file() {
-            return Err(failure(io::Error::other("it is no plain file")));
+            return Err(failure(io::Error::other("it is not a plain file")));
         }
         Ok((path, metadata.len()))
     }

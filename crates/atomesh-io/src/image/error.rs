@@ -257,8 +257,8 @@ pub enum ReadReason {
     },
     /// Traces that no inline and crossline numbers arrange are neither a grid nor a line.
     #[error(
-        "{traces} traces have neither inline nor crossline numbers, and by X and Y they are no regular \
-         grid and no line either: steps from trace to trace are {median:.4} mostly, {longest:.4} at most"
+        "{traces} traces have neither inline nor crossline numbers, and by X and Y they form neither a \
+         regular grid nor a line: steps from trace to trace are {median:.4} mostly, {longest:.4} at most"
     )]
     NoLine {
         /// The traces with coordinates.

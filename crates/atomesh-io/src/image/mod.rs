@@ -177,7 +177,7 @@ fn load(
     }
     if !metadata.is_file() {
         // a pipe would keep us waiting, a device has no end
-        return Err(ReadReason::Io(std::io::Error::other("it is no plain file")));
+        return Err(ReadReason::Io(std::io::Error::other("it is not a plain file")));
     }
     let mut file = File::open(path).map_err(ReadReason::Io)?;
     let root = options.data_root.as_deref();

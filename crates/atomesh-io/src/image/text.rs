@@ -98,7 +98,7 @@ impl<R: BufRead> TextSamples<R> {
 
     /// The error for the word at hand. It is not told: a header may name any file as that of its samples.
     fn wrong(&self) -> io::Error {
-        let text = format!("word {} is no {}", self.count + 1, self.sample_type);
+        let text = format!("word {} is not of type {}", self.count + 1, self.sample_type);
         io::Error::new(io::ErrorKind::InvalidData, text)
     }
 
@@ -176,7 +176,7 @@ mod tests {
         ] {
             let read = TextSamples::new(text.as_bytes(), kind).read_to_end(&mut Vec::new());
             let message = read.unwrap_err().to_string();
-            assert_eq!(message, format!("word {word} is no {kind}"));
+            assert_eq!(message, format!("word {word} is not of type {kind}"));
         }
         let endless = vec![b'1'; 1 << 20];
         assert!(TextSamples::new(&endless[..], SampleType::F64).read(&mut [0; 8]).is_err());

@@ -40,7 +40,7 @@ pub enum MshEncoding {
 
 /// A file's name does not say which mesh format it has.
 #[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
-#[error("{path:?} is no mesh file by its name; expected one of {known}")]
+#[error("{path:?} is not a mesh file by its name; expected one of {known}")]
 pub struct UnknownMeshFormat {
     /// The name.
     pub path: PathBuf,

@@ -87,7 +87,7 @@ impl SurfaceFormat {
 pub enum SurfaceWriteError {
     /// The name calls for no known format.
     #[error(
-        "{path:?} is no surface file by its name; expected one of {}",
+        "{path:?} is not a surface file by its name; expected one of {}",
         SurfaceFormat::EXTENSIONS
     )]
     Format {

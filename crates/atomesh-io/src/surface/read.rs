@@ -14,7 +14,9 @@ use crate::mesh::MeshReadError;
 #[non_exhaustive]
 pub enum SurfaceReadError {
     /// The name calls for no format that is read.
-    #[error("{0:?} is no surface file that is read; expected .vtp, .stl, .obj, .ply, .ts or .pl")]
+    #[error(
+        "{0:?} is not a surface file that can be read; expected .vtp, .stl, .obj, .ply, .ts or .pl"
+    )]
     Format(std::path::PathBuf),
     /// The system did not give the bytes.
     #[error("the surface could not be read: {0}")]

@@ -92,9 +92,9 @@ fn pipes_are_refused_and_not_waited_for() {
     for (name, text) in headers("pipe.png") {
         fs::write(scan.join(name), text).unwrap();
         let error = plain(&scan.join(name)).unwrap_err();
-        assert!(error.to_string().contains("no plain file"), "{error}");
+        assert!(error.to_string().contains("not a plain file"), "{error}");
     }
-    assert!(plain(&pipe).unwrap_err().to_string().contains("no plain file"));
+    assert!(plain(&pipe).unwrap_err().to_string().contains("not a plain file"));
 }
 
 #[test]

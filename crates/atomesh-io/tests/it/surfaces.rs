@@ -107,7 +107,7 @@ fn formats_refuse_what_they_cannot_hold_and_leave_no_file() {
     let advice = "cannot hold lines; expected .vtp, .obj, .ply or .pl for a flat mesh";
     assert_eq!(refused("a.stl"), format!("STL {advice}"));
     assert_eq!(refused("a.ts"), format!("GOCAD TSurf {advice}"));
-    assert!(refused("a.vtu").contains("is no surface file by its name; expected one of .vtp"));
+    assert!(refused("a.vtu").contains("is not a surface file by its name; expected one of .vtp"));
     let (mesh, groups) = solid();
     let error = write_surface(&folder.path().join("a.pl"), &mesh, &groups, None, &mut Silent);
     assert!(error.unwrap_err().to_string().starts_with("GOCAD PLine cannot hold triangles"));

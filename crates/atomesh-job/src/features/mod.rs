@@ -1,5 +1,6 @@
 //! The facets of a mesh that follow an image, as surfaces and as tags.
 
+mod cells;
 mod write;
 
 use std::path::{Path, PathBuf};
@@ -8,10 +9,11 @@ use atomesh::enhance::{FeatureOptions, given_potential};
 use atomesh::features::{
     FacetField, FacetTest, FacetsOfFeature, FeatureFacetOptions, FeatureSet, Selection,
 };
-use atomesh::image::{Image, Units};
+use atomesh::fields::ScalarField;
+use atomesh::image::{Frame, Image, Units};
 use atomesh::mesh::is_feature_name;
 use atomesh::run::MeshOptions;
-use atomesh_io::mesh::LoadedMesh;
+use atomesh_io::mesh::{LoadedMesh, Provenance};
 
 use crate::dimension::Dimension;
 use crate::error::JobError;
@@ -27,7 +29,8 @@ use write::FeatureFiles;
 #[derive(Clone, Debug, PartialEq)]
 #[cfg_attr(feature = "clap", derive(clap::Args))]
 pub struct FeaturesRequest {
-    /// Mesh, in world coordinates: .vtu .vtk .msh .msh2 .npz .inp
+    /// Mesh, in world coordinates: .vtu .vtk .msh .msh2 .npz .inp; or Voronoi cells that atomesh wrote: .vtu, or .json (a
+    /// list of connections)
     #[cfg_attr(feature = "clap", arg(value_name = "MESH"))]
     pub mesh: PathBuf,
     /// Image whose features the facets follow. Its frame is that of the options below, else of the
@@ -41,7 +44,7 @@ pub struct FeaturesRequest {
     #[cfg_attr(feature = "clap", arg(short, long, value_name = "SURFACE"))]
     pub output: Option<PathBuf>,
     /// Mesh to write with the features and the sides of the box as tagged facets: .vtu .msh .msh2 .inp, or
-    /// a folder named polyMesh
+    /// a folder named polyMesh; Voronoi cells: .vtu
     #[cfg_attr(feature = "clap", arg(long, value_name = "MESH"))]
     pub mesh_output: Option<PathBuf>,
     /// Write the parts into which the features cut the mesh as its regions of cells, 1, 2 ..., in place of those
@@ -193,9 +196,23 @@ fn along<const D: usize>(
     dimension: &Dimension<D>,
     session: &mut Session<'_>,
 ) -> Result<FacetField<D>, JobError> {
+    let (frame, units, potential) =
+        potential(request, loaded.provenance.as_ref(), image, dimension, session)?;
+    let mesh = (dimension.tools.lattice_mesh)(&loaded.mesh, &frame, units);
+    Ok((dimension.tools.field_along)(&mesh, &potential, session)?)
+}
+
+/// b from an image or potential, with the frame and the lattice units that it is in.
+fn potential<const D: usize>(
+    request: &FeaturesRequest,
+    made_by: Option<&Provenance>,
+    image: Image<D>,
+    dimension: &Dimension<D>,
+    session: &mut Session<'_>,
+) -> Result<(Frame<D>, Units, ScalarField<D>), JobError> {
     let path = request.source().unwrap_or(&request.mesh);
-    let made_in = mesh_file::units(loaded.provenance.as_ref());
-    let units = request.units.or(made_in).unwrap_or_default();
+    let units = mesh_file::units(made_by);
+    let units = request.units.or(units).unwrap_or_default();
     let run = RunConfig { features: request.features.clone(), ..RunConfig::default() };
     let options: MeshOptions<D> = run.mesh_options()?;
     let (frame, samples) = if request.potential.is_some() {
@@ -209,8 +226,7 @@ fn along<const D: usize>(
     };
     let potential = (dimension.tools.potential)(frame.grid(units), samples, options.interpolation);
     let potential = potential.map_err(|e| JobError::content(e).about(path))?;
-    let mesh = (dimension.tools.lattice_mesh)(&loaded.mesh, &frame, units);
-    Ok((dimension.tools.field_along)(&mesh, &potential, session)?)
+    Ok((frame, units, potential))
 }
 
 /// Finds features of files, and writes them.
@@ -225,13 +241,11 @@ pub fn features_file(
     match mesh_file::read(&request.mesh, session)? {
         MeshFile::Flat(mesh) => run(request, &files, &mesh, &Dimension::plane(), session),
         MeshFile::Volume(mesh) => run(request, &files, &mesh, &Dimension::space(), session),
-        MeshFile::Polygons(_) | MeshFile::Polyhedra(_) => {
-            let advice = "the faces on their features were chosen when they were made; `atomesh surfaces` writes them";
-            Err(mesh_file::simplices_only(
-                &request.mesh,
-                "features are chosen among facets of",
-                advice,
-            ))
+        MeshFile::Polygons(mesh) => {
+            cells::run(request, &files, &mesh, &Dimension::plane(), session)
+        }
+        MeshFile::Polyhedra(mesh) => {
+            cells::run(request, &files, &mesh, &Dimension::space(), session)
         }
     }
 }

@@ -26,8 +26,8 @@ struct Found<'a, const D: usize> {
 
 /// The files to write, in formats that are known.
 pub(super) struct FeatureFiles<'a> {
-    request: &'a FeaturesRequest,
-    surface: Option<(&'a Path, SurfaceFormat)>,
+    pub(super) request: &'a FeaturesRequest,
+    pub(super) surface: Option<(&'a Path, SurfaceFormat)>,
 }
 
 impl<'a> FeatureFiles<'a> {

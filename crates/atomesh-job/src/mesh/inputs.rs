@@ -138,7 +138,9 @@ impl<const D: usize> MeshImages<D> {
         let of = Samples::of(&image, units, run).map_err(|e| e.about_any(shown))?;
         let image = images::place(image, &run.frame, shown, session)?;
         run.mesh_options::<D>()?;
-        memory::check_potential(image.samples().len(), "mesh").map_err(|e| e.about_any(shown))?;
+        // what makes b is forecast where it is made
+        memory::check_potential(image.samples().len(), 4.0, "mesh")
+            .map_err(|e| e.about_any(shown))?;
         let mut field = |given: Option<GivenField<D>>, path: Option<&Path>, kind: FieldKind| {
             let source = match (given, path) {
                 (Some(given), _) => FieldSource::of(given, &kind, session)?,
@@ -369,6 +371,7 @@ impl<'a, const D: usize> FieldSource<'a, D> {
         }
         let field = onto(field, is_placed, run, of, between, &mut say);
         let field = field.map_err(|e| e.about(file))?;
+        note_filled(&field, run, file, session);
         run.frame.place(field).map_err(|e| e.about(file))
     }
 }
@@ -376,6 +379,20 @@ impl<'a, const D: usize> FieldSource<'a, D> {
 /// Whether a frame is that of samples of which nothing is known but their number: unit steps, the first at 0.
 fn is_bare<const D: usize>(frame: &Frame<D>) -> bool {
     Frame::new(frame.shape()).as_ref() == Ok(frame)
+}
+
+/// Says how many samples of a field get the value of `--fill`.
+fn note_filled<const D: usize>(
+    field: &Image<D>,
+    run: &RunConfig,
+    path: &Path,
+    session: &mut Session<'_>,
+) {
+    let count = field.samples().range().nan_count;
+    if let Some(fill) = run.frame.fill.filter(|_| count > 0) {
+        let text = format!("{count} samples are NaN; they become {fill}");
+        session.note(Note { kind: NoteKind::Change, file: Some(path.into()), text });
+    }
 }
 
 /// The field at the samples of the image.

@@ -21,7 +21,9 @@ pub fn refusal(run: &RunConfig, error: RunError) -> JobError {
         RunError::Memory { .. } | RunError::FeatureMemory { .. } => {
             JobError::memory(error).about_any(shown)
         }
-        RunError::LatticeDimension { .. } => JobError::misuse(error).about_any(shown),
+        RunError::LatticeDimension { .. } | RunError::Crowded { .. } => {
+            JobError::misuse(error).about_any(shown)
+        }
         RunError::Lattice(LatticeError::SeedOutside { index, .. }) => {
             outside(run, *index).about_any(shown)
         }

@@ -134,7 +134,10 @@ impl FrameOptions {
             vertical: self.vertical,
         };
         if let Some(root) = self.data_root.as_ref().filter(|root| !root.is_dir()) {
-            return Err(JobError::misuse(format!("--data-root {} is no folder", root.display())));
+            return Err(JobError::misuse(format!(
+                "--data-root {} is not a folder",
+                root.display()
+            )));
         }
         let data_root = self.data_root.clone();
         let stack = StackOptions { channel: self.channel, time: self.time };
@@ -205,9 +208,9 @@ impl FrameOptions {
         let before = image.absent();
         let is_absent = |index: usize| is_nan(index) || before.is_some_and(|flags| flags[index]);
         let absent = (0..image.samples().len()).map(is_absent).collect();
-        let (frame, mut samples) = image.into_parts();
+        let mut samples = image.samples().clone();
         samples.fill_nan(fill);
-        let filled = Image::new(frame, samples).and_then(|image| image.with_absent(absent));
+        let filled = image.with_samples(samples).and_then(|image| image.with_absent(absent));
         filled.map_err(JobError::content)
     }
 }

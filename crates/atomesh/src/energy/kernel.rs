@@ -6,8 +6,8 @@ use super::lanes::{Lanes, WIDTH};
 use super::neighbors::List;
 use super::pair;
 
-/// Below any squared distance of two atoms that are not at one place.
-const TINY: f64 = 1e-300;
+/// Below any u² of two atoms that are not at one place; far enough above 0 that 1/d², up to 1e60, over it is finite.
+const TINY: f64 = 1e-200;
 
 /// What scales a pair's distance and energy.
 pub(super) trait Scale {

@@ -37,7 +37,7 @@ pub struct Mixture(Vec<Share>);
 #[non_exhaustive]
 pub enum MixtureError {
     /// An unknown kind.
-    #[error("{name:?} is no kind of features; expected one of {}", Features::NAMES.join(", "))]
+    #[error("{name:?} is not a kind of features; expected one of {}", Features::NAMES.join(", "))]
     Kind {
         /// The name found.
         name: String,
@@ -187,7 +187,7 @@ mod tests {
     #[test]
     fn what_is_no_mixture_is_named() {
         let error = |text: &str| text.parse::<Mixture>().unwrap_err().to_string();
-        assert!(error("folds").starts_with("\"folds\" is no kind"));
+        assert!(error("folds").starts_with("\"folds\" is not a kind"));
         assert!(error("").contains("dark, bright, edges"));
         assert!(error("dark:2").contains("\"2\" weighs dark"));
         for weight in ["0", "-1", "nan", "x", ""] {

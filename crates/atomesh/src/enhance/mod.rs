@@ -145,7 +145,8 @@ fn denoised<const D: usize>(
     let grid = image.frame().grid(options.units);
     let values = image.continued().as_ref().unwrap_or(image).samples().to_f32();
     let clean = denoise(&values, &grid, &denoising, watch)?;
-    Ok(Some(image.clone().with_samples(Samples::F32(clean.into()))))
+    let clean = image.clone().with_samples(Samples::F32(clean.into()));
+    Ok(Some(clean.expect("there are as many samples as before")))
 }
 
 /// Points on the features of an image, in lattice coordinates: crests between samples, whatever the potential is made

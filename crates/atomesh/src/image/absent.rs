@@ -10,7 +10,7 @@
 use rayon::prelude::*;
 
 use super::place::coordinates;
-use super::{FrameError, Image};
+use super::{FrameError, Image, Range};
 
 /// How far beyond the nearest sample that is there a mirrored one is looked for, over the distance to it: where it is
 /// absent too, or outside of the image, the next.
@@ -33,6 +33,20 @@ impl<const D: usize> Image<D> {
     /// Whether each sample has no data; `None` if all have some.
     pub fn absent(&self) -> Option<&[bool]> {
         self.absent.as_deref()
+    }
+
+    /// The range of the samples that have data; of all, if none has.
+    pub fn range(&self) -> Range {
+        let Some(absent) = self.absent().filter(|absent| absent.contains(&false)) else {
+            return self.samples.range();
+        };
+        let count = absent.iter().filter(|absent| !**absent).count();
+        let mut at = 0;
+        let runs = absent.chunk_by(|a, b| a == b).filter_map(|run| {
+            at += run.len();
+            (!run[0]).then_some(at - run.len()..at)
+        });
+        self.samples.gather(count, runs).range()
     }
 
     /// The image with what is absent continued from what is there, mirrored about the nearest sample that is: all samples
@@ -238,6 +252,19 @@ mod tests {
         let continued = row([true, true, true, true, false, false]).continued().unwrap();
         assert_eq!(continued.samples(), &Samples::U8(vec![6, 6, 6, 6, 5, 6].into()));
         assert!(row([false; 6]).continued().is_none() && row([true; 6]).continued().is_none());
+    }
+
+    #[test]
+    fn places_without_data_are_not_in_the_range() {
+        let frame = Frame::new([3, 2]).unwrap();
+        let image = Image::new(frame, Samples::U8(vec![0, 7, 5, 0, 9, 0])).unwrap();
+        let ends = |absent: [bool; 6]| {
+            let range = image.clone().with_absent(absent.to_vec()).unwrap().range();
+            (range.min, range.max)
+        };
+        assert_eq!(ends([true, false, false, true, true, true]), (5.0, 7.0));
+        assert_eq!(ends([false; 6]), (0.0, 9.0));
+        assert_eq!(ends([true; 6]), (0.0, 9.0));
     }
 
     #[test]

@@ -72,13 +72,12 @@ impl<const D: usize> Image<D> {
         &self.samples
     }
 
-    /// Other samples at the same places; those without data stay so.
+    /// Other samples at the same places, of any type; places without data stay so.
     ///
-    /// # Panics
-    /// If there are not as many.
-    pub fn with_samples(self, samples: Samples) -> Self {
-        assert_eq!(samples.len(), self.frame.sample_count());
-        Self { samples, ..self }
+    /// # Errors
+    /// [`FrameError::SampleCount`] if there are not as many.
+    pub fn with_samples(self, samples: Samples) -> Result<Self, FrameError> {
+        Ok(Self { absent: self.absent, ..Self::new(self.frame, samples)? })
     }
 
     /// The frame and the samples.

@@ -118,6 +118,8 @@ pub struct ImproveReport {
     pub below: usize,
     /// Whether every cell keeps the floor.
     pub floor_held: bool,
+    /// Whether so many cells stayed below the floor after a round that it was given up.
+    pub gave_up: bool,
 }
 
 impl ImproveReport {

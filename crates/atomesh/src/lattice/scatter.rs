@@ -298,6 +298,10 @@ impl<const D: usize> Spread<'_, D> {
     }
 }
 
+/// Below this measure of the parallelepiped of a cell's unit edges, rounding of coordinates moves its centre by a
+/// millionth of the radius and more: along the axis of corners on one circle as far as another atom.
+const FLAT: f64 = 1e-9;
+
 /// The centre and radius of the sphere through D + 1 points; `None` if they are flat, or so nearly that
 /// rounding decides.
 fn circumsphere<'a, const D: usize>(
@@ -310,13 +314,13 @@ fn circumsphere<'a, const D: usize>(
         rows[k] = difference(corner, first);
         right[k] = [0.5 * dot(&rows[k], &rows[k])];
     }
-    if solve(D, rows, &mut right) == 0.0 {
+    let lengths: f64 = rows.iter().map(|row| dot(row, row).sqrt()).product();
+    if solve(D, rows, &mut right).abs() <= FLAT * lengths {
         return None;
     }
     let offset = right.map(|[x]| x);
     let radius = dot(&offset, &offset).sqrt();
     let centre = std::array::from_fn(|k| first[k] + offset[k]);
-    // the centre of a nearly flat cell may be anywhere, even on another atom
     let off = |row: &Point<D>| (distance_squared(row, &offset).sqrt() - radius).abs();
     let is_sound = rows.iter().map(off).fold(0.0, f64::max) <= 1e-6 * radius;
     (radius.is_finite() && is_sound).then_some((centre, radius))

@@ -6,7 +6,7 @@ use super::*;
 use crate::fields::NominalDistance;
 use crate::geometry::{difference, distance_squared, dot};
 use crate::image::Grid;
-use crate::mesh::{Delaunay, Mesh};
+use crate::mesh::{Delaunay, Mesh, merge_duplicates};
 use crate::watch::{Phase, Silent, Watch};
 
 fn grid<const D: usize>(shape: [usize; D]) -> Grid<D> {
@@ -595,4 +595,15 @@ fn atoms_that_make_no_lattice_are_named() {
     assert_eq!(end.unwrap_err(), LatticeError::NoCorner { corner: vec![0.0, 0.0] });
     let flat = Bounds { min: [0.0, 0.0], max: [8.0, 0.0] };
     assert_eq!(Lattice::from_atoms(flat, corners).unwrap_err(), LatticeError::Thin { axis: 1 });
+}
+
+#[test]
+fn centres_of_nearly_flat_cells_are_no_atoms() {
+    // round after round, rounding put the centre of a flat cell onto an atom
+    let grid = Grid { shape: [21, 20, 23], step: [1.0; 3] };
+    let distance = NominalDistance::constant(&grid, 6.973).unwrap();
+    let options = ScatterOptions { seed: 636, ..Default::default() };
+    let lattice =
+        scatter(&Scatterer::<3>::new(), grid.bounds(), &distance, &options, &mut Silent).unwrap();
+    assert_eq!(merge_duplicates(lattice.atoms()).0.len(), lattice.len());
 }

@@ -46,6 +46,12 @@ pub enum MeasureError {
         /// How many points the mesh holds.
         points: usize,
     },
+    /// No cell lies where labels are.
+    #[error("none of {cells} cells has labels")]
+    NoLabels {
+        /// How many cells there are.
+        cells: usize,
+    },
     /// A nominal distance that is not a length.
     #[error("nominal distance {value} samples; expected a finite number above 0")]
     Size {

@@ -82,9 +82,6 @@ const TRIED_ANGLE: [f64; 2] = [25.0, 15.0];
 /// How far from bad cells what is held is given free, time after time, in rings of cells around them.
 const RELEASES: [usize; 3] = [0, 1, 3];
 
-/// More cells below the floor than so many, and than this share of all, tell of a floor out of reach.
-const MANY: (usize, f64) = (100, 0.05);
-
 /// How many rings of cells more are improved then.
 const AROUND: usize = 2;
 
@@ -118,9 +115,9 @@ fn improve_around<const D: usize>(
     for rings in RELEASES {
         let (is_bad, count) = corners_of_bad_cells(&mesh, options.min_angle);
         (report.below, report.floor_held) = (count, count == 0);
-        let is_out_of_reach = count > MANY.0 && count as f64 > MANY.1 * mesh.cell_count() as f64;
-        if count == 0 || is_out_of_reach {
-            break; // without features it would be out of reach too
+        // a floor that was given up without features near is out of reach without them too
+        if count == 0 || report.gave_up && min_angle == options.min_angle {
+            break;
         }
         let is_released = widened(&mesh, is_bad, rings);
         let near = widened(&mesh, is_released.clone(), AROUND);

@@ -92,6 +92,19 @@ pub enum RunError {
         /// Bytes allowed.
         available: u64,
     },
+    /// A spacing factor so small that a graded lattice would be another than asked for.
+    #[error(
+        "with the spacing factor {factor}, edges of a lattice that varies would be about {share:.2} of the nominal \
+         distance; expected a factor of {:.2} or more, or a smaller distance", (100.0 * least).ceil() / 100.0
+    )]
+    Crowded {
+        /// The spacing factor γ.
+        factor: f64,
+        /// The length of edges over d.
+        share: f64,
+        /// The least factor taken.
+        least: f64,
+    },
     /// The potential could not be made.
     #[error(transparent)]
     Enhance(#[from] EnhanceError),
@@ -125,6 +138,21 @@ pub enum RunError {
     /// The Voronoi cells could not be made.
     #[error(transparent)]
     Voronoi(VoronoiError),
+    /// Cells without volume, to the precision of numbers.
+    #[error(
+        "{count} of {all} cells have no {} to the precision of numbers, the first near {place}; a lower image weight \
+         (--beta), another size or seed may avoid it", if *.dimension == 2 { "area" } else { "volume" }
+    )]
+    Flat {
+        /// How many cells.
+        count: usize,
+        /// The number of all cells.
+        all: usize,
+        /// The middle of the first, in world coordinates.
+        place: String,
+        /// The image's dimension.
+        dimension: usize,
+    },
     /// The mesh could not be measured.
     #[error(transparent)]
     Measure(MeasureError),

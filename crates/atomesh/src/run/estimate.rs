@@ -1,8 +1,12 @@
 //! What a run will take, before it starts.
 
-use crate::enhance::{EdgeOperator, FeatureOptions, Features};
-use crate::fields::NominalDistance;
+use rayon::prelude::*;
+
+use crate::enhance::{EdgeOperator, FeatureOptions, Features, Mixture};
+use crate::fields::{Interpolation, NominalDistance, ScalarField};
 use crate::image::Grid;
+
+use super::find::LEAST_DEPTH;
 
 /// What a run is expected to take.
 #[derive(Clone, Copy, Debug, PartialEq, serde::Serialize)]
@@ -64,6 +68,8 @@ pub(super) struct Beside {
     pub feature_points: usize,
     /// Bytes of the sampled engine's tables; 0 for other engines.
     pub tables: f64,
+    /// Bytes that the improver takes to find valleys of b, and what lies beside them then; 0 if it looks for none.
+    pub valleys: f64,
     /// How many atoms there are for each that d asks for: so many times the neighbours has each.
     pub crowding: f64,
 }
@@ -78,6 +84,10 @@ const NEIGHBOURS: [f64; 2] = [10.0, 26.0];
 const NEIGHBOUR_BYTES: f64 = 8.0;
 /// The share of an atom's time that its neighbours take.
 const PAIR_SHARE: f64 = 0.3;
+/// Bytes an atom takes, its cells included, while valleys of b are looked for; measured in the plane.
+const ATOM_BESIDE_VALLEYS: f64 = 82.0;
+/// Bytes a sample that stages before have left behind by then, likewise.
+const LEFT_BYTES: f64 = 6.0;
 /// Bytes that any run takes.
 const BASE_BYTES: f64 = 12e6;
 
@@ -86,19 +96,39 @@ impl Estimate {
     pub(super) fn new<const D: usize>(work: Work, atoms: f64, beside: Beside) -> Self {
         // Euler: 2 triangles a point. Random points have 6.77 tetrahedra each, lattices 5 to 6.
         let cells = atoms * if D == 2 { 2.0 } else { 6.0 };
-        let Beside { samples, copies, feature_points, tables, crowding } = beside;
+        let Beside { samples, copies, feature_points, tables, valleys, crowding } = beside;
         let crowded = crowding - 1.0;
         let lists = NEIGHBOUR_BYTES * NEIGHBOURS[D - 2] * crowded;
-        let memory = BASE_BYTES
-            + 4.0 * (samples * copies) as f64
+        let moving = 4.0 * (samples * copies) as f64
             + FEATURE_POINT_BYTES * feature_points as f64
             + tables
             + (work.atom_bytes()[D - 2] + lists) * atoms;
+        let improving = valleys + if valleys > 0.0 { ATOM_BESIDE_VALLEYS * atoms } else { 0.0 };
+        let memory = BASE_BYTES + moving.max(improving);
         let sampling = if tables > 0.0 { SAMPLED_SECONDS * samples as f64 } else { 0.0 };
         let each = work.atom_seconds()[D - 2] * (1.0 + PAIR_SHARE * crowded);
         let cpu_seconds = each * atoms + sampling;
         Self { atoms: atoms as u64, cells: cells as u64, memory: memory as u64, cpu_seconds }
     }
+}
+
+/// Bytes at the peak while the improver of the plane looks for valleys of b: a volume, b itself, what is left of stages
+/// before, and for each sample in a valley its place, its depth and its derivatives. Cost: O(samples).
+pub(super) fn valley_bytes<const D: usize>(potential: &ScalarField<D>) -> f64 {
+    let samples = potential.samples();
+    let is_deep = |b: &&f32| **b < -LEAST_DEPTH;
+    let deep = samples.par_iter().with_min_len(1 << 16).filter(is_deep).count();
+    let copies = if potential.interpolation() == Interpolation::Spline { 3.0 } else { 2.0 };
+    let of_deep = 12.0 + 4.0 * (D + D * D) as f64;
+    (4.0 * copies + LEFT_BYTES) * samples.len() as f64 + of_deep * deep as f64
+}
+
+/// Bytes a sample that making b takes at the peak, beside the image: b itself, and what finds features of these kinds.
+pub fn potential_bytes(mixture: &Mixture, options: &FeatureOptions) -> f64 {
+    let shares = mixture.shares();
+    let kinds = shares.iter().map(|share| FeatureOptions { features: share.features, ..*options });
+    let most = kinds.map(|kind| feature_bytes(&kind, shares.len() > 1)).fold(0.0, f64::max);
+    4.0 + most
 }
 
 /// Bytes a sample that looking for features takes at the peak beside the image and b; what is less than a copy of b is
@@ -145,4 +175,24 @@ pub(super) fn atoms<const D: usize>(
     let d = distance.mean();
     let widened: f64 = extent.iter().map(|e| 1.0 + filling.rim * d / e).product();
     (distance.estimated_atoms(filling.density) * widened).max((1 << D) as f64)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn valleys_take_memory_by_their_share_of_the_samples() {
+        let grid = Grid::<2> { shape: [40, 25], step: [1.0; 2] };
+        // one sample in five is in a valley
+        let b = (0..1000).map(|i| if i % 5 == 0 { -0.5 } else { -0.01 }).collect();
+        let potential = ScalarField::potential(grid, b, Interpolation::Linear).unwrap();
+        // b, a volume, six bytes; of those in valleys a place, a depth, two slopes and four second derivatives
+        assert_eq!(valley_bytes(&potential), 14.0 * 1000.0 + 36.0 * 200.0);
+        let beside = |valleys| Beside { samples: 1000, copies: 1, valleys, ..Beside::default() };
+        let memory = |valleys| Estimate::new::<2>(Work::Moved, 10.0, beside(valleys)).memory;
+        // of two peaks the greater counts
+        assert_eq!(memory(0.0), memory(1000.0));
+        assert_eq!(memory(1e6) as f64, BASE_BYTES + 1e6 + 820.0);
+    }
 }

@@ -21,7 +21,7 @@ use super::prepare::image_of;
 /// has already it is max(1, d/6).
 const LEAST_VARIANCE: f64 = 0.8;
 /// The least depth of a valley at all, and over that of the deepest tenth.
-const LEAST_DEPTH: f32 = 0.05;
+pub(super) const LEAST_DEPTH: f32 = 0.05;
 const DEPTH_SHARE: f32 = 0.3;
 
 /// The depth that a group of bottoms reaches somewhere, over that of the deepest tenth. On a section of faults the

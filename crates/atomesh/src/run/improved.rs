@@ -9,7 +9,7 @@ use crate::features::{
     FacetField, FacetTest, FacetsOfFeature, Feature, FeatureFacetOptions, find_features,
 };
 use crate::fields::{Interpolation, NominalDistance, ScalarField};
-use crate::geometry::Point;
+use crate::geometry::{Point, dot};
 use crate::image::{Samples, gaussian};
 use crate::improve::ImproveReport;
 use crate::measure::cell_shape;
@@ -21,6 +21,7 @@ use crate::sample::{SampleOptions, Statistic, sample_in_frame};
 use crate::watch::{Phase, Watch, check};
 
 use super::error::{RunError, Warning};
+use super::options::MeshKind;
 use super::outcome::Outcome;
 use super::prepared::{Parts, Prepared};
 
@@ -62,7 +63,7 @@ impl<const D: usize> Improved<D> {
     /// Labels the cells and reads the fields at the points.
     ///
     /// # Errors
-    /// [`RunError::Sample`], also when cancelled.
+    /// [`RunError::Flat`] if a cell has no volume to the precision of numbers; [`RunError::Sample`], also when cancelled.
     pub fn finish(self, watch: &mut dyn Watch) -> Result<Outcome<D>, RunError> {
         (self.run.parts().method.stages().finish)(self, watch)
     }
@@ -74,6 +75,7 @@ pub(super) fn finish<const D: usize>(
     watch: &mut dyn Watch,
 ) -> Result<Outcome<D>, RunError> {
     let Improved { run, mesh, report, mirror_report, improve_report } = improved;
+    refuse_flat(&run, &mesh)?;
     let Parts { outline, labels, .. } = run.parts();
     let (potential, distance) = (run.potential(), run.distance());
     let outline_facets = match outline {
@@ -129,6 +131,36 @@ fn in_world<const D: usize>(run: &Prepared<D>, place: &Point<D>) -> String {
     place.map(|x| x.trim_end_matches('0').trim_end_matches('.').to_string()).join(",")
 }
 
+/// A cell is flat if its measure is at most this times the cube (2-D: square) of the longest edge at its first corner:
+/// rounding of coordinates leaves as much of a cell without volume.
+const FLAT: f64 = 1e-12;
+
+/// Refuses a mesh whose cells are positive by exact arithmetic alone: no solver could use it. Not for Voronoi cells, whose
+/// sites keep apart ([`crate::voronoi::sites_apart`]).
+fn refuse_flat<const D: usize>(run: &Prepared<D>, mesh: &Mesh<D>) -> Result<(), RunError> {
+    if run.options().kind == MeshKind::Voronoi {
+        return Ok(());
+    }
+    let is_flat = |cell: &[u32]| {
+        let simplex = mesh.simplex(cell);
+        let squared = simplex.edges().iter().map(|edge| dot(edge, edge)).fold(0.0, f64::max);
+        simplex.measure() <= FLAT * squared.powf(D as f64 / 2.0)
+    };
+    let cells = mesh.corners().par_chunks_exact(D + 1).with_min_len(1 << 10);
+    let count = cells.clone().filter(|cell| is_flat(cell)).count();
+    let Some(first) = cells.find_first(|cell| is_flat(cell)) else { return Ok(()) };
+    let place = in_world(run, &middle(mesh, first));
+    Err(RunError::Flat { count, all: mesh.cell_count(), place, dimension: D })
+}
+
+/// The mean of a cell's corners.
+fn middle<const D: usize>(mesh: &Mesh<D>, corners: &[u32]) -> Point<D> {
+    std::array::from_fn(|k| {
+        let along = corners.iter().map(|&corner| mesh.points()[corner as usize][k]);
+        along.sum::<f64>() / corners.len() as f64
+    })
+}
+
 /// A warning if cells stay below the floor of angles, with the place of the flattest.
 fn below_floor<const D: usize>(
     run: &Prepared<D>,
@@ -142,11 +174,7 @@ fn below_floor<const D: usize>(
     let angle = |cell: &[u32]| cell_shape(&mesh.simplex(cell).edges()).least_angle;
     let angles = cells.map(|(index, cell)| (angle(cell), index));
     let (least, flattest) = angles.min_by(|a, b| a.0.total_cmp(&b.0).then(a.1.cmp(&b.1)))?;
-    let corners = mesh.cells().nth(flattest)?;
-    let middle = std::array::from_fn(|k| {
-        let along = corners.iter().map(|&corner| mesh.points()[corner as usize][k]);
-        along.sum::<f64>() / corners.len() as f64
-    });
+    let middle = middle(mesh, mesh.cells().nth(flattest)?);
     Some(Warning::BelowFloor {
         count: report.below,
         all: mesh.cell_count(),

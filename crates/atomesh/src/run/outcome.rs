@@ -314,9 +314,8 @@ pub(super) fn world_cells_of<const D: usize>(outcome: &Outcome<D>) -> Option<Pol
 
 /// [`Outcome::sample_cells`].
 pub(super) fn sample_cells_of<const D: usize>(outcome: &Outcome<D>) -> Option<PolyMesh<D>> {
-    let step = outcome.potential().grid().step;
-    let to = |p: &Point<D>| std::array::from_fn(|k| p[k] / step[k]);
-    outcome.cells.as_ref().map(|cells| cells.moved(false, to))
+    let grid = outcome.potential().grid();
+    outcome.cells.as_ref().map(|cells| cells_in_samples(cells, grid))
 }
 
 /// [`Prepared::distance_at_samples`].
@@ -422,4 +421,20 @@ pub fn lattice_mesh<const D: usize>(mesh: &Mesh<D>, frame: &Frame<D>, units: Uni
 /// The mesh with its points moved from lattice to sample coordinates.
 pub(super) fn in_samples<const D: usize>(mesh: &Mesh<D>, grid: &Grid<D>) -> Mesh<D> {
     mesh.moved(false, |p| std::array::from_fn(|k| p[k] / grid.step[k]))
+}
+
+/// Voronoi cells in world coordinates, moved back to the lattice coordinates of an image's frame; the inverse of
+/// [`Outcome::world_cells`]. Points that rounding has put off a side of the image's box are on it again.
+pub fn lattice_cells<const D: usize>(
+    cells: &PolyMesh<D>,
+    frame: &Frame<D>,
+    units: Units,
+) -> PolyMesh<D> {
+    let bounds = frame.grid(units).bounds();
+    cells.moved(frame.is_mirrored(), |p| bounds.snap(&frame.world_to_lattice(units, p), 0.0))
+}
+
+/// The cells with their points moved from lattice to sample coordinates.
+pub(super) fn cells_in_samples<const D: usize>(cells: &PolyMesh<D>, grid: &Grid<D>) -> PolyMesh<D> {
+    cells.moved(false, |p| std::array::from_fn(|k| p[k] / grid.step[k]))
 }

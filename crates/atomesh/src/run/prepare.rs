@@ -21,6 +21,11 @@ use super::prepared::{Parts, Prepared};
 /// So many atoms in the place of one are said.
 const MOST_CROWDED: f64 = 1.2;
 
+/// Edges shorter than this, over d, because of a small spacing factor are refused: forces reach as many times as many
+/// atoms as d asks for as there are, so that minutes pass on images of a thousand samples, and the mesh is not what was
+/// asked for.
+const SHORTEST_EDGES: f64 = 1.0 / 3.0;
+
 /// Makes b(x), d(x) and β(x).
 pub(super) fn prepare<const D: usize>(
     method: &Method<D>,
@@ -53,7 +58,7 @@ pub(super) fn prepare<const D: usize>(
     let weight = weight(&inputs, grid, options.image_weight)?;
     let is_masked = outline.is_some();
     warnings.extend(coarse(&grid, &distance));
-    warnings.extend(crowded(&options, &distance));
+    warnings.extend(crowded(&options, &distance)?);
     check(watch, Phase::Distance, 1.0, None)?;
     let potential = ScalarField::potential(grid, samples, options.interpolation)?;
     let (mut found, mut faced) = (Found::default(), None);
@@ -182,17 +187,24 @@ fn coarse<const D: usize>(grid: &Grid<D>, distance: &NominalDistance<D>) -> Opti
     Some(Warning::Coarse { axis, distance, extent: extent[axis] })
 }
 
-/// A warning where the spacing factor makes edges much shorter than d.
+/// A warning where the spacing factor makes edges shorter than d.
+///
+/// # Errors
+/// [`RunError::Crowded`] where they would be much shorter.
 fn crowded<const D: usize>(
     options: &MeshOptions<D>,
     distance: &NominalDistance<D>,
-) -> Option<Warning> {
-    let crowding = crowding(distance, options.spacing_factor);
-    let is_grown = options.lattice != LatticeKind::Random;
-    (is_grown && crowding > MOST_CROWDED).then(|| Warning::Crowded {
-        factor: options.spacing_factor,
-        share: crowding.powf(-1.0 / D as f64),
-    })
+) -> Result<Option<Warning>, RunError> {
+    let (factor, crowding) = (options.spacing_factor, crowding(distance, options.spacing_factor));
+    if options.lattice == LatticeKind::Random || crowding <= MOST_CROWDED {
+        return Ok(None);
+    }
+    let share = crowding.powf(-1.0 / D as f64); // in proportion to the factor
+    if share < SHORTEST_EDGES {
+        let least = factor * SHORTEST_EDGES / share;
+        return Err(RunError::Crowded { factor, share, least });
+    }
+    Ok(Some(Warning::Crowded { factor, share }))
 }
 
 /// Refuses images whose features need more memory to be found than there is.

@@ -9,6 +9,7 @@ use crate::energy;
 use crate::fields::{Fields, FieldsView, Interpolation, NominalDistance, ScalarField};
 use crate::geometry::{Bounds, Point, compact_order};
 use crate::image::{Frame, Grid, Samples};
+use crate::improve::Align;
 use crate::lattice::{
     GrowOptions, Lattice, Place, ScatterOptions, fill_holes, grow_within, scatter, settle,
 };
@@ -150,11 +151,10 @@ impl<const D: usize> Prepared<D> {
         let atoms = share * crowding * estimate::atoms(grid, self.distance(), filling);
         let is_sampled = options.optimize.engine == EngineKind::Sampled;
         let spline = options.interpolation == Interpolation::Spline;
-        let smooth = options.optimize.smoothing_steps > 0;
+        let conforming = self.0.pieces.is_some();
+        let smooth = options.optimize.smoothing_steps > 0 && !conforming;
         // looking for crests takes two volumes and a copy of the potential
         let mirrored = self.pairs_atoms() && self.potential().range().1 > 0.0;
-        // b without what atoms stand on
-        let conforming = self.0.pieces.is_some();
         let copies = [
             is_sampled,
             spline,
@@ -163,6 +163,7 @@ impl<const D: usize> Prepared<D> {
             mirrored,
             mirrored,
             mirrored,
+            // b without what atoms stand on
             conforming,
             conforming && spline,
         ];
@@ -172,6 +173,11 @@ impl<const D: usize> Prepared<D> {
             copies: 1 + copies.into_iter().filter(|&c| c).count(),
             feature_points: pieces.into_iter().flatten().map(Pieces::point_count).sum(),
             crowding,
+            valleys: if self.looks_for_valleys() {
+                estimate::valley_bytes(self.potential())
+            } else {
+                0.0
+            },
             tables: if is_sampled { energy::table_bytes(grid, self.distance()) } else { 0.0 },
         };
         let work = match options.kind {
@@ -272,6 +278,13 @@ impl<const D: usize> Prepared<D> {
     pub(super) fn pairs_atoms(&self) -> bool {
         let Parts { options, outline, .. } = &*self.0;
         options.kind == MeshKind::Voronoi && options.mirror && outline.is_none()
+    }
+
+    /// Whether the improver looks for valleys of b: in the plane.
+    fn looks_for_valleys(&self) -> bool {
+        let MeshOptions { kind, improve, .. } = &self.0.options;
+        let is_improved = *kind == MeshKind::Delaunay && improve.align != Align::Off;
+        D == 2 && is_improved && !self.stays_still()
     }
 
     /// Whether nothing pulls atoms.

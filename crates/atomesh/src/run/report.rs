@@ -10,11 +10,11 @@ use crate::measure::{
     ShapeReport, SpreadReport, WantedSize, alignment, alignment_of_faces, conformity, features,
     fidelity, precision, shape, spread,
 };
-use crate::mesh::{Mesh, PolyReport};
+use crate::mesh::{Mesh, PolyMesh, PolyReport};
 use crate::watch::Watch;
 
 use super::error::RunError;
-use super::outcome::{Outcome, in_samples, own_features};
+use super::outcome::{Outcome, cells_in_samples, in_samples, own_features};
 
 /// The figures of a mesh: its shape, and how it follows the image.
 #[derive(Clone, Debug, PartialEq, serde::Serialize)]
@@ -43,6 +43,33 @@ pub struct VoronoiReport {
     pub shape: PolyReport,
     /// How faces follow the valleys of −|b|: features attract or repel.
     pub alignment: AlignmentReport,
+    /// How pure cells are, if labels were given.
+    pub homogeneity: Option<HomogeneityReport>,
+}
+
+impl VoronoiReport {
+    /// Measures cells in lattice coordinates against the samples of b on a grid, for features that faces of cells `size`
+    /// apart, in lattice units, can follow. Homogeneity, which needs labels, is left out.
+    ///
+    /// # Errors
+    /// [`MeasureError`], also when cancelled.
+    pub fn new<const D: usize>(
+        cells: &PolyMesh<D>,
+        grid: &Grid<D>,
+        potential: &[f32],
+        size: f64,
+        watch: &mut dyn Watch,
+    ) -> Result<Self, MeasureError> {
+        let size = grid.in_samples(size);
+        let valleys: Vec<f32> = potential.iter().map(|b| -b.abs()).collect();
+        let b = SampledPotential { values: &valleys, shape: grid.shape };
+        let found = features(b, size, watch)?;
+        let options = AlignmentOptions::new(size);
+        let in_samples = cells_in_samples(cells, grid);
+        let alignment = alignment_of_faces(&in_samples, &found, &options, watch)?;
+        let shape = PolyReport::new(cells, &grid.bounds());
+        Ok(Self { shape, alignment, homogeneity: None })
+    }
 }
 
 /// What a mesh is measured against.
@@ -107,18 +134,10 @@ pub(super) fn of_cells<const D: usize>(
     outcome: &Outcome<D>,
     watch: &mut dyn Watch,
 ) -> Result<Option<VoronoiReport>, RunError> {
-    let (Some(cells), Some(in_samples)) = (outcome.cells(), outcome.sample_cells()) else {
-        return Ok(None);
-    };
-    let (potential, distance) = (outcome.potential(), outcome.distance());
-    let grid = potential.grid();
-    let size = grid.in_samples(distance.mean());
-    let valleys: Vec<f32> = potential.samples().iter().map(|b| -b.abs()).collect();
-    let b = SampledPotential { values: &valleys, shape: grid.shape };
-    let found = features(b, size, watch)?;
-    let options = AlignmentOptions::new(size);
-    let alignment = alignment_of_faces(&in_samples, &found, &options, watch)?;
-    Ok(Some(VoronoiReport { shape: PolyReport::new(cells, &grid.bounds()), alignment }))
+    let Some(cells) = outcome.cells() else { return Ok(None) };
+    let potential = outcome.potential();
+    let (grid, size) = (potential.grid(), outcome.distance().mean());
+    Ok(Some(VoronoiReport::new(cells, grid, potential.samples(), size, watch)?))
 }
 
 /// [`Outcome::report`].

@@ -177,3 +177,22 @@ fn options_are_written_and_read_whole_and_in_part() {
     assert!(wrong(r#"{"seed_points": [[1, 2, 3]]}"#).contains("a point of 3 numbers; expected 2"));
     assert!(wrong(r#"{"sise": 3}"#).contains("unknown field `sise`"));
 }
+
+#[test]
+fn cells_without_area_to_the_precision_of_numbers_are_refused_with_their_place() {
+    let image = ball::<2>(9);
+    let options = options(4.0, MeshKind::Delaunay);
+    let prepared = prepare(&Method::plane(), Inputs::image(&image), options, &mut Silent).unwrap();
+    // valid by exact arithmetic: a point as far above a side as a rounding of its length
+    let finished = |height: f64| {
+        let points = vec![[0.0, 0.0], [8.0, 0.0], [8.0, 8.0], [0.0, 8.0], [4.0, height]];
+        let mesh = Mesh::new(points, vec![0, 1, 4, 1, 2, 4, 2, 3, 4, 3, 0, 4]).unwrap();
+        assert_eq!(mesh.validate(), Ok(()));
+        prepared.with_mesh(mesh).unwrap().unimproved().finish(&mut Silent)
+    };
+    let error = finished(1e-14).unwrap_err();
+    let expected = "1 of 4 cells have no area to the precision of numbers, the first near 4,0; a lower image weight \
+                    (--beta), another size or seed may avoid it";
+    assert_eq!(error.to_string(), expected);
+    assert!(finished(1e-6).is_ok());
+}

@@ -574,8 +574,16 @@ fn small_spacing_factors_are_forecast_and_said() {
             assert!((0.7..2.2).contains(&share), "{D} {spacing_factor}: {estimate} for {actual}");
         }
     }
-    check(&Method::plane(), [64, 64], &[0.15, 0.3, 0.5]);
+    check(&Method::plane(), [64, 64], &[0.22, 0.3, 0.5]);
     check(&Method::space(), [26, 24, 24], &[0.3, 0.5]);
+    // edges of a third of d are the shortest taken
+    let image = sheet(Frame::new([26, 24, 24]).unwrap());
+    let size = Size::Range { min: 4.0, max: 12.0 };
+    let options = MeshOptions { size, spacing_factor: 0.23, ..Default::default() };
+    let error = prepare(&Method::space(), Inputs::image(&image), options, &mut Silent).unwrap_err();
+    let expected = "with the spacing factor 0.23, edges of a lattice that varies would be about 0.32 of the nominal \
+                    distance; expected a factor of 0.24 or more, or a smaller distance";
+    assert_eq!(error.to_string(), expected);
     // where d is constant, sites are those of one crystal
     let image = sheet(Frame::new([64, 64]).unwrap());
     let options = MeshOptions { spacing_factor: 0.3, ..sized(4.0) };

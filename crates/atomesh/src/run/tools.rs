@@ -1,7 +1,10 @@
 //! What is done with images and meshes outside of a run, as a value.
 
 use crate::enhance::{EnhanceError, Enhanced, FeatureOptions, Mixture, enhance, enhance_mixture};
-use crate::features::{FacetField, FeatureFacetOptions, FeatureSet, FeaturesError, find_features};
+use crate::features::{
+    FacetField, FeatureFaces, FeatureFacetOptions, FeatureSet, FeaturesError, feature_faces,
+    find_features,
+};
 use crate::fields::{FieldError, Interpolation, ScalarField};
 use crate::geometry::{Bounds, Point};
 use crate::image::{Frame, Grid, Image, Samples, Units};
@@ -14,8 +17,8 @@ use crate::sample::{CellProperties, SampleError, SampleOptions, sample};
 use crate::voronoi::{VoronoiError, voronoi};
 use crate::watch::Watch;
 
-use super::outcome::{lattice_mesh, sides};
-use super::report::MeshReport;
+use super::outcome::{lattice_cells, lattice_mesh, sides};
+use super::report::{MeshReport, VoronoiReport};
 
 type EnhanceImage<const D: usize> =
     fn(&Image<D>, &FeatureOptions, &mut dyn Watch) -> Result<Enhanced<D>, EnhanceError>;
@@ -37,6 +40,9 @@ type Measure<const D: usize> = fn(
     &mut dyn Watch,
 ) -> Result<MeshReport, MeasureError>;
 
+type MeasureCells<const D: usize> =
+    fn(&PolyMesh<D>, &Grid<D>, &[f32], f64, &mut dyn Watch) -> Result<VoronoiReport, MeasureError>;
+
 type Shape<const D: usize> =
     fn(&Mesh<D>, Option<&Bounds<D>>, &mut dyn Watch) -> Result<ShapeReport, MeasureError>;
 
@@ -46,8 +52,8 @@ type Potential<const D: usize> =
 type Fidelity<const D: usize> =
     fn(&Mesh<D>, &Frame<D>, &Samples, &mut dyn Watch) -> Result<FidelityReport, MeasureError>;
 
-type Homogeneity<const D: usize> =
-    fn(&Mesh<D>, &Image<D>, &mut dyn Watch) -> Result<HomogeneityReport, MeasureError>;
+type Homogeneity<C, const D: usize> =
+    fn(&C, &Image<D>, &mut dyn Watch) -> Result<HomogeneityReport, MeasureError>;
 
 type Sample<C, const D: usize> =
     fn(&C, &Image<D>, SampleOptions<'_>, &mut dyn Watch) -> Result<CellProperties, SampleError>;
@@ -71,14 +77,20 @@ pub struct Tools<const D: usize> {
     pub find_features: FindFeatures<D>,
     /// [`MeshReport::new`].
     pub measure: Measure<D>,
+    /// [`VoronoiReport::new`].
+    pub measure_cells: MeasureCells<D>,
+    /// [`feature_faces`](feature_faces()).
+    pub feature_faces: fn(&PolyMesh<D>, &ScalarField<D>, f64, f64) -> FeatureFaces,
     /// [`shape`](shape()).
     pub shape: Shape<D>,
     /// [`PolyReport::new`].
     pub cells_shape: fn(&PolyMesh<D>, &Bounds<D>) -> PolyReport,
     /// [`fidelity`](fidelity()).
     pub fidelity: Fidelity<D>,
-    /// [`homogeneity`](homogeneity()).
-    pub homogeneity: Homogeneity<D>,
+    /// [`homogeneity`](homogeneity()) of triangles or tetrahedra.
+    pub homogeneity: Homogeneity<Mesh<D>, D>,
+    /// [`homogeneity`](homogeneity()) of polygons or polyhedra.
+    pub homogeneity_of_cells: Homogeneity<PolyMesh<D>, D>,
     /// [`sample`](sample()) in triangles or tetrahedra.
     pub sample: Sample<Mesh<D>, D>,
     /// [`sample`](sample()) in polygons or polyhedra.
@@ -87,6 +99,8 @@ pub struct Tools<const D: usize> {
     pub sides: fn(&Mesh<D>, &Bounds<D>, bool) -> Tags<D>,
     /// [`lattice_mesh`].
     pub lattice_mesh: fn(&Mesh<D>, &Frame<D>, Units) -> Mesh<D>,
+    /// [`lattice_cells`].
+    pub lattice_cells: fn(&PolyMesh<D>, &Frame<D>, Units) -> PolyMesh<D>,
     /// [`ScalarField::potential`].
     pub potential: Potential<D>,
     /// [`voronoi`](voronoi()).
@@ -120,14 +134,18 @@ impl<const D: usize> Tools<D> {
             field_along: FacetField::along,
             find_features,
             measure: MeshReport::new,
+            measure_cells: VoronoiReport::new,
+            feature_faces,
             shape,
             cells_shape: PolyReport::new,
             fidelity,
             homogeneity,
+            homogeneity_of_cells: homogeneity,
             sample,
             sample_cells: sample,
             sides,
             lattice_mesh,
+            lattice_cells,
             potential: ScalarField::potential,
             voronoi,
         }

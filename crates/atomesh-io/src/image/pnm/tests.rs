@@ -95,8 +95,8 @@ fn pam_is_read_with_and_without_a_type() {
 #[test]
 fn broken_files_are_refused() {
     for (file, part) in [
-        (&b"P2 2 1 255 1 x"[..], "word 2 is no uint8"),
-        (b"P2 2 1 255 1 256", "word 2 is no uint8"),
+        (&b"P2 2 1 255 1 x"[..], "word 2 is not of type uint8"),
+        (b"P2 2 1 255 1 256", "word 2 is not of type uint8"),
         (b"P2 2 1 0 1 2", "MAXVAL is 0"),
         (b"P5 2 1 65536\n1234", "MAXVAL is 65536"),
         (b"P5 -2 1 255\n12", "number is \"-\""),

@@ -96,3 +96,28 @@ fn samples_held_from_before_are_those_read_anew() {
     held_equals_read::<2>();
     held_equals_read::<3>();
 }
+
+/// Two atoms at one place and one beside them, in lengths of any magnitude.
+fn atoms_at_one_place_push_each_other_nowhere<const D: usize>() {
+    for scale in [1e-28, 1e-5, 1.0, 1e28] {
+        let grid = Grid { shape: [9; D], step: [scale; D] };
+        let b = vec![0.0; grid.sample_count()];
+        let potential = ScalarField::potential(grid, b, Interpolation::Linear).unwrap();
+        let distance = NominalDistance::constant(&grid, 2.0 * scale).unwrap();
+        let weight = ImageWeight::constant(0.5).unwrap();
+        let fields = FieldsView { potential: &potential, weight: &weight, distance: &distance };
+        let atoms = [[4.0; D], [4.0; D], [5.0; D]].map(|p: Point<D>| p.map(|x| x * scale));
+        let mut engine = PairsEngine::new(fields);
+        engine.prepare(&atoms, 0.1);
+        let mut gradient = [[0.0; D]; 3];
+        assert!(engine.evaluate(&atoms, &mut gradient).total().is_finite());
+        assert!(gradient.as_flattened().iter().all(|g| g.is_finite()), "{scale}: {gradient:?}");
+        assert_eq!(gradient[0], gradient[1]);
+    }
+}
+
+#[test]
+fn atoms_at_one_place_have_a_finite_gradient_at_any_scale() {
+    atoms_at_one_place_push_each_other_nowhere::<2>();
+    atoms_at_one_place_push_each_other_nowhere::<3>();
+}

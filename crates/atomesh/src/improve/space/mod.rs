@@ -124,6 +124,7 @@ fn improve_parts(
             report.swaps += effort.swaps;
             report.moves += effort.moves;
             report.rounds = report.rounds.max(effort.rounds);
+            report.gave_up |= effort.gave_up;
             for &point in &part.held {
                 let point = part.points[point as usize] as usize;
                 held[point] = pending.as_ref().is_none_or(|p| p[point]);

@@ -18,7 +18,7 @@ use super::MeasureError;
 use super::statistics::{self, Histogram, sums};
 use crate::image::{Frame, Image, Samples, Units};
 use crate::mesh::Mesh;
-use crate::sample::{SampleOptions, Statistic, check_samples, sample};
+use crate::sample::{CellSurfaces, SampleOptions, Statistic, check_samples, sample};
 use crate::watch::{Phase, Watch, check};
 use linear::System;
 use overlap::CellSums;
@@ -109,21 +109,21 @@ struct PlacedMesh<'a, const D: usize> {
     samples: &'a Samples,
 }
 
-/// Measures how much of one label each cell is; the mesh is in world coordinates.
+/// Measures how much of one label each cell is; the cells are in world coordinates.
 ///
 /// # Errors
-/// [`MeasureError`] if the mesh has no cells with labels, the image holds no labels, or the watch ends the work.
+/// [`MeasureError`] if no cell has labels, the image holds no labels, or the watch ends the work.
 pub fn homogeneity<const D: usize>(
-    mesh: &Mesh<D>,
+    cells: &impl CellSurfaces<D>,
     labels: &Image<D>,
     watch: &mut dyn Watch,
 ) -> Result<HomogeneityReport, MeasureError> {
     let options = SampleOptions::new(&[Statistic::Homogeneity]);
-    let found = sample(mesh, labels, options, watch)?;
+    let found = sample(cells, labels, options, watch)?;
     let of_cells = &found.values[0];
     let known: Vec<f64> = of_cells.iter().copied().filter(|share| share.is_finite()).collect();
     if known.is_empty() {
-        return Err(MeasureError::NoCells { points: mesh.points().len() });
+        return Err(MeasureError::NoLabels { cells: of_cells.len() });
     }
     let [shares, weights] = sums(0..of_cells.len(), &|i| {
         let weight = found.measures[i] * found.coverage[i];

@@ -1,0 +1,206 @@
+//! Features among the faces of Voronoi cells.
+//!
+//! Those that the file names, unless a threshold is given: they were found when the cells were made. Else faces along which
+//! |b| is large in the mean, since features repel the sites of cells as often as they attract them.
+
+use std::path::Path;
+
+use atomesh::features::{FacetTest, FeatureFaces, FeatureFacetOptions, Selection};
+use atomesh::geometry::{Bounds, Point};
+use atomesh::mesh::{PolyMesh, feature_name};
+use atomesh_io::mesh::CellFields;
+use atomesh_io::mesh::cells::{CellData, LoadedCells};
+use atomesh_io::output_group::OutputGroup;
+use serde_json::{Value, json};
+
+use super::write::FeatureFiles;
+use super::{FeaturesRequest, FeaturesSummary, potential};
+use crate::dimension::Dimension;
+use crate::error::JobError;
+use crate::files::{self, has_extension, write_bytes};
+use crate::images::{Beside, ImageRole};
+use crate::session::Session;
+use crate::surfaces::{feature_groups, points_of};
+
+/// Finds features of cells, and writes them.
+///
+/// # Errors
+/// As [`super::features_file`], and if an option is of triangles and tetrahedra alone.
+pub(super) fn run<const D: usize>(
+    request: &FeaturesRequest,
+    files: &FeatureFiles<'_>,
+    loaded: &LoadedCells<D>,
+    dimension: &Dimension<D>,
+    session: &mut Session<'_>,
+) -> Result<FeaturesSummary, JobError> {
+    files.check_dimension(D)?;
+    check_options(request)?;
+    let (found, selection) = find(request, loaded, dimension, session)?;
+    let writing = Writing { files, loaded, found: &found, selection, dimension };
+    session.write_together(|group, session| writing.write(group, session))?;
+    let facets = found.of_faces.iter().filter(|of| **of > 0).count();
+    Ok(FeaturesSummary { features: found.areas.len(), facets, selection, from_points: false })
+}
+
+/// Refuses what Voronoi cells do not have.
+fn check_options(request: &FeaturesRequest) -> Result<(), JobError> {
+    let refused = [
+        (request.regions, "--regions"),
+        (request.close_gaps, "--close-gaps"),
+        (request.test != FacetTest::default(), "--test max"),
+    ];
+    if let Some((_, option)) = refused.iter().find(|(is_given, _)| *is_given) {
+        let message = format!("{option} is for triangles and tetrahedra, not Voronoi cells");
+        return Err(JobError::misuse(message).about(&request.mesh));
+    }
+    if let Some(below) = request.below.filter(|below| *below >= 0.0) {
+        let message = format!("--below {below}; expected a number below 0 for Voronoi cells");
+        return Err(JobError::misuse(message).about(&request.mesh));
+    }
+    match &request.mesh_output {
+        Some(path) if !has_extension(path, "vtu") => {
+            Err(JobError::misuse("Voronoi cells are written as .vtu").about(path))
+        }
+        _ => Ok(()),
+    }
+}
+
+/// The faces on features, and how many were chosen and dropped.
+fn find<const D: usize>(
+    request: &FeaturesRequest,
+    loaded: &LoadedCells<D>,
+    dimension: &Dimension<D>,
+    session: &mut Session<'_>,
+) -> Result<(FeatureFaces, Selection), JobError> {
+    let count = |found: &FeatureFaces| found.of_faces.iter().filter(|of| **of > 0).count();
+    if request.below.is_none() && !loaded.features.areas.is_empty() {
+        let own = loaded.features.clone();
+        let selection = Selection { chosen: count(&own), ..Selection::default() };
+        return Ok((own, selection));
+    }
+    let Some(path) = request.source() else {
+        let message = "the cells name no features; expected IMAGE or --potential FILE";
+        return Err(JobError::misuse(message).about(&request.mesh));
+    };
+    let (frame, provenance) = (Some(&loaded.frame), Some(&loaded.provenance));
+    let beside = Beside { frame, provenance, options: &request.frame, role: ImageRole::Followed };
+    let image = beside.read(path, dimension, session)?;
+    let (frame, units, potential) = potential(request, provenance, image, dimension, session)?;
+    let cells = (dimension.tools.lattice_cells)(&loaded.mesh, &frame, units);
+    let least = -request.below.unwrap_or(FeatureFacetOptions::default().below);
+    let found = (dimension.tools.feature_faces)(&cells, &potential, least, 0.0);
+    let chosen = count(&found);
+    let kept = large_enough(request, &loaded.mesh, found);
+    let selection = Selection { chosen, dropped: chosen - count(&kept), ..Selection::default() };
+    Ok((kept, selection))
+}
+
+/// The features that have enough faces, and enough length or area in the world, the largest first.
+fn large_enough<const D: usize>(
+    request: &FeaturesRequest,
+    world: &PolyMesh<D>,
+    mut found: FeatureFaces,
+) -> FeatureFaces {
+    let mut all = vec![(0, 0.0, 0); found.areas.len()];
+    for (face, &of) in found.of_faces.iter().enumerate().filter(|(_, of)| **of > 0) {
+        let (count, area, number) = &mut all[of as usize - 1];
+        *count += 1;
+        *area += length(&world.area_vector(face));
+        *number = of;
+    }
+    all.retain(|&(count, area, _)| count >= request.min_facets && area >= request.min_measure);
+    all.sort_by(|a, b| b.1.total_cmp(&a.1)); // stable
+    let mut number = vec![0; found.areas.len() + 1];
+    all.iter().zip(1..).for_each(|(&(_, _, old), new)| number[old as usize] = new);
+    found.of_faces.iter_mut().for_each(|of| *of = number[*of as usize]);
+    found.areas = all.into_iter().map(|(_, area, _)| area).collect();
+    found
+}
+
+fn length<const D: usize>(vector: &Point<D>) -> f64 {
+    vector.iter().map(|x| x * x).sum::<f64>().sqrt()
+}
+
+/// Features of cells, to be written.
+struct Writing<'a, const D: usize> {
+    files: &'a FeatureFiles<'a>,
+    loaded: &'a LoadedCells<D>,
+    found: &'a FeatureFaces,
+    selection: Selection,
+    dimension: &'a Dimension<D>,
+}
+
+impl<const D: usize> Writing<'_, D> {
+    fn write(&self, group: &mut OutputGroup, session: &mut Session<'_>) -> Result<(), JobError> {
+        let (cells, request) = (&self.loaded.mesh, self.files.request);
+        if let Some((path, _)) = self.files.surface {
+            let path = &files::stage(path, group)?;
+            let groups = feature_groups(cells, self.found);
+            let means: Option<Vec<f32>> =
+                (1..=groups.len() as u32).map(|n| self.mean(n).map(|mean| mean as f32)).collect();
+            let points = points_of(cells)?;
+            let write = self.dimension.files.surface;
+            let written = write(path, &points, &groups, means.as_deref(), session);
+            written.map_err(|e| JobError::from(e).about(path))?;
+        }
+        if let Some(path) = &files::stage_any(&request.mesh_output, group)? {
+            self.write_cells(path, session)?;
+        }
+        if let Some(path) = &files::stage_any(&request.json, group)? {
+            let features: Vec<Value> =
+                (1..=self.found.areas.len() as u32).map(|number| self.report(number)).collect();
+            let report = json!({
+                "selection": self.selection,
+                "features": features,
+                "notes": session.notes_json(),
+            });
+            write_bytes(path, format!("{report:#}\n").as_bytes())?;
+        }
+        Ok(())
+    }
+
+    fn write_cells(&self, path: &Path, session: &mut Session<'_>) -> Result<(), JobError> {
+        let LoadedCells { mesh, fields, frame, provenance, .. } = self.loaded;
+        let data = CellData { mesh, features: self.found, frame, provenance };
+        let mut all = CellFields::new(mesh.cell_count());
+        for field in fields {
+            all = all.with_numbers(&field.name, &field.values).map_err(JobError::content)?;
+        }
+        let written = (self.dimension.files.cells_with)(path, &data, &all, session);
+        written.map_err(|e| JobError::from(e).about(path))
+    }
+
+    /// The faces of a feature.
+    fn faces(&self, number: u32) -> impl Iterator<Item = usize> + '_ {
+        let all = self.found.of_faces.iter().enumerate();
+        all.filter(move |(_, of)| **of == number).map(|(face, _)| face)
+    }
+
+    /// The mean of |b| over a feature, as −|b|; `None` where the file that names the feature does not say it.
+    fn mean(&self, number: u32) -> Option<f64> {
+        let (mut sum, mut total) = (0.0, 0.0);
+        for face in self.faces(number) {
+            let area = length(&self.loaded.mesh.area_vector(face));
+            sum -= area * f64::from(*self.found.strengths.get(face)?);
+            total += area;
+        }
+        (total > 0.0).then(|| sum / total)
+    }
+
+    /// A feature in numbers, in world coordinates.
+    fn report(&self, number: u32) -> Value {
+        let cells = &self.loaded.mesh;
+        let corners = self.faces(number).flat_map(|face| cells.face(face));
+        let points: Vec<Point<D>> = corners.map(|&c| cells.points()[c as usize]).collect();
+        let bounds = Bounds::of(&points);
+        json!({
+            "id": number,
+            "name": feature_name(number),
+            "facets": self.faces(number).count(),
+            "measure": self.faces(number).map(|face| length(&cells.area_vector(face))).sum::<f64>(),
+            "mean": self.mean(number),
+            "min": bounds.map_or(vec![], |b| b.min.to_vec()),
+            "max": bounds.map_or(vec![], |b| b.max.to_vec()),
+        })
+    }
+}
