@@ -80,7 +80,8 @@ pub fn enhance<const D: usize>(
     let (mixture, options) = wanted(features, units);
     let made = (dimension.tools.enhance_mixture)(&mixture, &options, image, session)?;
     let Enhanced { values, constant, .. } = made;
-    let image = Image::new(*image.frame(), Samples::F32(values.into())).map_err(JobError::content)?;
+    let image =
+        Image::new(*image.frame(), Samples::F32(values.into())).map_err(JobError::content)?;
     Ok(Potential { image, mixture, is_constant: constant })
 }
 

@@ -194,7 +194,7 @@ fn nan_that_a_value_replaces_is_noted_in_labels_too() {
     let (frame, samples) = ball(frame([16, 14, 12], [-8.0, -6.0, -5.0])).into_parts();
     let mut labels = samples.to_f32();
     labels[5..8].fill(f32::NAN);
-    let path = case.write("holes.nrrd", &Image::new(frame, Samples::F32(labels)).unwrap());
+    let path = case.write("holes.nrrd", &Image::new(frame, Samples::F32(labels.into())).unwrap());
     let (labels, notes) = case.read(&path, |run| run.frame.fill = Some(7.0)).unwrap();
     assert_eq!(labels.samples().get(6), 7.0);
     assert!(notes[0].ends_with("3 samples are NaN; they become 7"), "{notes:?}");

@@ -85,8 +85,7 @@ fn without_an_image_pictures_and_reports_are_refused() {
     let (prepared, _) = prepare(&run, MeshImages::new(image()), &plane, &mut session).unwrap();
     let outcome = meshed(&run, prepared, &mut session).unwrap();
     run.output.picture = Some(folder.path().join("m.png"));
-    let made =
-        MadeMesh { run: &run, outcome: &outcome, image: None, units: &[], properties: &[] };
+    let made = MadeMesh { run: &run, outcome: &outcome, image: None, units: &[], properties: &[] };
     assert!(made.report(&plane, &mut session).is_err());
     let refused = made.write(&plane, &mut session).unwrap_err();
     assert!(refused.to_string().contains("need the image"), "{refused}");

@@ -257,7 +257,7 @@ mod tests {
     #[test]
     fn places_without_data_are_not_in_the_range() {
         let frame = Frame::new([3, 2]).unwrap();
-        let image = Image::new(frame, Samples::U8(vec![0, 7, 5, 0, 9, 0])).unwrap();
+        let image = Image::new(frame, Samples::U8(vec![0, 7, 5, 0, 9, 0].into())).unwrap();
         let ends = |absent: [bool; 6]| {
             let range = image.clone().with_absent(absent.to_vec()).unwrap().range();
             (range.min, range.max)
