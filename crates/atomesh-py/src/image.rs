@@ -146,8 +146,9 @@ impl Image {
     }
 
     /// The image of another package's object: SimpleITK.Image, itk.Image, a nibabel image, pyvista.ImageData, an
-    /// xarray.DataArray, or whatever NumPy takes for an array. Frame and order of axes come from the object; nibabel's
-    /// world (right, anterior, superior) is turned into DICOM's and ITK's (left, posterior, superior), as `read` does.
+    /// xarray.DataArray, or whatever NumPy takes for an array. Frame and order of axes come from the object, and places are
+    /// in its own world: nibabel's is right, anterior, superior, as that of files that `read` reads; SimpleITK's and ITK's is
+    /// left, posterior, superior, where x and y of a scan have the other sign.
     ///
     /// Parameters
     /// ----------

@@ -41,7 +41,7 @@ def watch(event):
 def once():
     entered.set()
 
-z, y, x = np.indices((110, 110, 110), np.float32)
+z, y, x = np.indices((84, 84, 84), np.float32)
 large = (128 + 100 * np.sin(x / 9) * np.sin(y / 11) * np.sin(z / 13)).astype(np.float32)
 options = dict(features="edges", size=3, progress=watch)
 killer = threading.Thread(target=kill, daemon=True)
@@ -51,16 +51,16 @@ if phase == "read":
         once()
         am.read(path)
 elif phase in ("assemble", "solve"):
-    mesh = am.mesh(large[:50, :50, :50], size=3, features="none", align="off")
+    mesh = am.mesh(large[:34, :34, :34], size=3, features="none", align="off")
     def job():
         mesh.flow(sides={"xmin": 1.0, "xmax": 0.0}, order=3, progress=watch)
 elif phase == "write":
-    mesh = am.mesh(large[:60, :60, :60], size=2, features="none", align="off")
+    mesh = am.mesh(large[:48, :48, :48], size=2, features="none", align="off")
     def job():
         for _ in range(200):
             mesh.write(os.path.join(folder, "m.msh"), order=2, msh_text=True, progress=watch)
 elif phase == "measure":
-    mesh = am.mesh(large[:60, :60, :60], size=2, features="none", align="off")
+    mesh = am.mesh(large[:48, :48, :48], size=2, features="none", align="off")
     def job():
         for _ in range(200):
             once()
@@ -71,7 +71,7 @@ elif phase == "steps":
         for step in lat.optimize():
             once()
 elif phase in ("lattice.connect", "connected.improve"):
-    lat = am.lattice(large, size=2.2)
+    lat = am.lattice(large[:70], size=2.2)
     made = lat.connect() if phase != "lattice.connect" else None
     def job():
         once()
@@ -116,7 +116,7 @@ def folder(tmp_path_factory: pytest.TempPathFactory) -> str:
     head[108:112] = np.array([352], "<f4").tobytes()
     head[344:348] = b"n+1\0"
     noise = np.random.default_rng(0).normal(size=(30, 300, 300)).astype("<f4").tobytes()
-    with gzip.open(made / "large.nii.gz", "wb", compresslevel=1) as file:
+    with gzip.open(made / "large.nii.gz", "wb", compresslevel=0) as file:
         file.write(head)
         for _ in range(10):
             file.write(noise)
