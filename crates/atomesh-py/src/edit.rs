@@ -254,11 +254,10 @@ impl Editor {
     /// The names of the atoms, shape (n,), uint32, and their places, shape (n, D), float64.
     #[getter]
     fn atoms<'py>(&self, py: Python<'py>) -> PyResult<(Bound<'py, PyAny>, Bound<'py, PyAny>)> {
-        let (names, places, axes) = {
-            let body = own(&self.body);
+        let (names, places, axes) = self.at_once(py, |body| {
             let (names, places) = body.atoms();
-            (names, places, body.dimension())
-        };
+            Ok((names, places, body.dimension()))
+        })?;
         let places = numpy::PyArray1::from_vec(py, places).into_any();
         let places = places.call_method1("reshape", ((-1, axes as isize),))?;
         Ok((numpy::PyArray1::from_vec(py, names).into_any(), places))
@@ -380,8 +379,8 @@ impl Editor {
         Mesh::new(py, body, notes.iter().map(errors::words).collect())
     }
 
-    fn __repr__(&self) -> String {
-        let body = own(&self.body);
-        format!("Editor({} atoms)", body.atoms().0.len())
+    fn __repr__(&self, py: Python<'_>) -> PyResult<String> {
+        let count = self.at_once(py, |body| Ok(body.atoms().0.len()))?;
+        Ok(format!("Editor({count} atoms)"))
     }
 }

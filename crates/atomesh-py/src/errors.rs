@@ -6,16 +6,18 @@ use pyo3::prelude::*;
 use std::ffi::CString;
 
 /// Options of the command that have other names as keywords.
-pub const RENAMED: [(&str, &str); 5] = [
+pub const RENAMED: [(&str, &str); 7] = [
     ("mesh", "kind"),
     ("seed_point", "fixed"),
     ("side", "sides"),
     ("source", "sources"),
     ("sink", "sinks"),
+    ("barrier", "barriers"),
+    ("permeability", "k"),
 ];
 
 /// Options of commands that are no sections of a run's options.
-const OTHERS: [&str; 14] = [
+const OTHERS: [&str; 16] = [
     "side",
     "source",
     "sink",
@@ -30,6 +32,8 @@ const OTHERS: [&str; 14] = [
     "statistic",
     "outside",
     "region",
+    "strict",
+    "threads",
 ];
 
 /// The keyword of an option whose name is spelt with underscores.
@@ -49,11 +53,10 @@ pub fn in_keywords(text: &str) -> String {
         let known = RunConfig::SECTIONS.iter().any(|(_, names)| names.contains(&option.as_str()));
         if known || OTHERS.contains(&option.as_str()) {
             out += keyword(&option);
-            // as in --fill VALUE
-            let mut after = rest.strip_prefix(' ').unwrap_or_default().chars();
-            if after.next().is_some_and(|c| c.is_ascii_uppercase())
-                && after.next().is_some_and(|c| c.is_ascii_uppercase())
-            {
+            // a placeholder for its value
+            let mut after = rest.chars().skip(1);
+            let is_upper = |c: Option<char>| c.is_some_and(|c| c.is_ascii_uppercase());
+            if rest.starts_with(' ') && is_upper(after.next()) && is_upper(after.next()) {
                 out = out + "=" + &rest[1..];
                 continue;
             }

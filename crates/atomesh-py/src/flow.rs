@@ -19,12 +19,29 @@ use pyo3::types::{PyBytes, PyDict, PyString};
 use serde_json::{Value, json};
 
 use crate::mesh::Made;
-use crate::options::Wishes;
+use crate::options::{Wishes, unknown};
 use crate::work::{How, work};
 use crate::{arrays, errors, json as python_json};
 
 /// The name of a permeability that is given as an array.
 const GIVEN: &str = "permeability";
+
+/// The names of the keywords of `Mesh.flow`.
+const KEYWORDS: [&str; 13] = [
+    "sources",
+    "sinks",
+    "sides",
+    "k",
+    "barriers",
+    "multiplier",
+    "order",
+    "porosity",
+    "solver",
+    "solver_tolerance",
+    "progress",
+    "threads",
+    "strict",
+];
 
 /// The keywords of `Mesh.flow`.
 pub struct Keywords<'a, 'py> {
@@ -113,10 +130,7 @@ impl Keywords<'_, '_> {
                 "solver_tolerance" => flow.solver_tolerance = value.extract()?,
                 "progress" | "threads" | "strict" => work.set_item(key, value)?,
                 other => {
-                    let known =
-                        "order, porosity, solver, solver_tolerance, progress, threads, strict";
-                    let message = format!("flow() has no keyword {other:?}; it has {known}");
-                    return Err(PyTypeError::new_err(message));
+                    return Err(unknown(py, "flow", other, KEYWORDS.to_vec()));
                 }
             }
         }

@@ -335,8 +335,8 @@ impl Mesh {
     /// --------
     /// >>> import numpy as np, atomesh as am
     /// >>> img = np.full((60, 80), 200, np.uint8); img[30, :] = 10
-    /// >>> am.mesh(img, size=8).report()["alignment"]["recall"] > 0.9
-    /// True
+    /// >>> am.mesh(img, size=8).report()["shape"]["inverted"]
+    /// 0
     #[pyo3(signature = (image = None, **options))]
     fn report<'py>(
         &self,
@@ -347,7 +347,12 @@ impl Mesh {
         let wishes = Wishes::take("report", options, &["features", "lattice", "frame"])?;
         let image = Self::image_for(image)?;
         let shared = Arc::clone(&self.shared);
-        let Wishes { run, how, .. } = wishes;
+        let Wishes { run, fields, how } = wishes;
+        if !(fields.is_empty() && run.input.is_empty()) {
+            let message =
+                "report() measures against the features of its image; expected no other images";
+            return Err(errors::input(py, message));
+        }
         let (value, _) = work(py, &how, move |session| shared.0.report(&run, image, session))?;
         json::to_python(py, &value)
     }
@@ -633,7 +638,8 @@ impl Mesh {
         interop(slf, "to_meshio")
     }
 
-    /// The mesh for `pyvista`, with its values and regions; a group of facets is had by `surface(name).to_pyvista()`.
+    /// The mesh for `pyvista`, with values, `region` among those of cells. Field data has the names of regions, as
+    /// "region 1", and the groups of facets, inner ones too, as "facets xmin": arrays (k, D) of numbers of points.
     ///
     /// Returns
     /// -------
@@ -642,7 +648,8 @@ impl Mesh {
         interop(slf, "to_pyvista")
     }
 
-    /// The mesh for `scikit-fem`, with its groups of facets as boundaries, inner ones too, and its regions as subdomains.
+    /// The mesh for `scikit-fem`, with its groups of facets as boundaries and its regions as subdomains. Inner groups are
+    /// oriented boundaries, whose normals point out of the region named first.
     ///
     /// Returns
     /// -------
@@ -653,17 +660,12 @@ impl Mesh {
 
     /// Edits the atoms of the mesh one by one, near features of its image.
     ///
-    /// Parameters
-    /// ----------
-    /// image : optional
-    ///     Not needed: the mesh knows its own image. A mesh that was read cannot be edited.
+    /// A mesh that was read cannot be edited: it does not know its image and options.
     ///
     /// Returns
     /// -------
     /// Editor
-    #[pyo3(signature = (image = None))]
-    fn edit(&self, py: Python<'_>, image: Option<&Bound<'_, PyAny>>) -> PyResult<Editor> {
-        let _ = image;
+    fn edit(&self, py: Python<'_>) -> PyResult<Editor> {
         let shared = Arc::clone(&self.shared);
         let (editor, _) = work(py, &Default::default(), move |session| shared.0.editor(session))?;
         Ok(Editor::new(editor))
@@ -762,8 +764,14 @@ impl Source {
                     let (image, units) = wishes.fields.remove(at).into_image();
                     Ok(Self::Potential(image, units))
                 }
-                None if wishes.run.input.potential.is_some() => Ok(Self::File),
-                None => Err(PyTypeError::new_err("no image; expected one, or potential=")),
+                None => match wishes.labels_alone() {
+                    Some((image, units)) => Ok(Self::Given(image, units)),
+                    None if wishes.run.input.shown().is_some() => Ok(Self::File),
+                    None => {
+                        let message = "no image; expected one, or potential= or labels=";
+                        Err(PyTypeError::new_err(message))
+                    }
+                },
             };
         }
         if is_path(image) {
@@ -811,14 +819,27 @@ pub fn placed<const D: usize>(
     session: &mut Session<'_>,
 ) -> Result<MeshImages<D>, JobError> {
     let given = Wishes::given(fields, dimension)?;
-    let has_potential = is_potential || given.potential.is_some();
     let mut images = MeshImages::with_fields(run, shown, given, dimension, session)?;
     images.is_potential |= is_potential;
-    if has_potential {
-        // as of a file: options of features have no part in the run then
-        run.input.potential = Some("potential".into());
-    }
+    name_fields(run, &images);
     Ok(images)
+}
+
+/// Names images in memory as files would be: options that they replace have no part in the run then.
+pub fn name_fields<const D: usize>(run: &mut RunConfig, images: &MeshImages<D>) {
+    let MeshImages { is_potential, potential, size_field, weight_field, mask, labels, .. } = images;
+    let input = &mut run.input;
+    for (path, is_there, name) in [
+        (&mut input.potential, *is_potential || potential.is_some(), "potential"),
+        (&mut input.size_field, size_field.is_some(), "size_field"),
+        (&mut input.beta_field, weight_field.is_some(), "beta_field"),
+        (&mut input.mask, mask.is_some(), "mask"),
+        (&mut input.labels, labels.is_some(), "labels"),
+    ] {
+        if is_there && path.is_none() {
+            *path = Some(name.into());
+        }
+    }
 }
 
 /// Meshes an image.
@@ -837,7 +858,7 @@ pub fn placed<const D: usize>(
 ///     What edges keep to: "dark" (default), "bright", "edges", "ridges", "horizons", "faults", "labels", "none"; or
 ///     several with weights.
 /// beta : float or image
-///     Weight of the image against regularity, 0 to 1. Default 0.5.
+///     Weight of the image against regularity, 0 to 1. Default 0.45.
 /// kind : str
 ///     "delaunay" (default) or "voronoi"; the command's --mesh.
 /// mask : image or path-like
@@ -995,6 +1016,11 @@ fn in_dimension<const D: usize>(
     (dimension.image)(image).ok_or_else(|| {
         JobError::content(format!("the image has {axes} axes; expected {D}, as the mesh"))
     })
+}
+
+/// The refusal to edit a mesh that was read.
+fn not_made() -> JobError {
+    JobError::misuse("a mesh that was read cannot be edited; expected one that mesh() made")
 }
 
 /// The refusal of what needs the image of a mesh that was read.

@@ -82,7 +82,7 @@ impl Wishes {
         for (key, value) in keywords {
             let key: String = key.extract()?;
             if !known(sections).iter().any(|name| *name == key) {
-                return Err(unknown(keywords.py(), function, &key, sections));
+                return Err(unknown(keywords.py(), function, &key, known(sections)));
             }
             if !value.is_none() {
                 self.take_one(&key, &value, sections)?;
@@ -165,6 +165,21 @@ impl Wishes {
         Ok(())
     }
 
+    /// Takes labels as the image itself, where no other is given: the boundaries between them are its features. Gives
+    /// those in memory.
+    pub fn labels_alone(&mut self) -> Option<(AnyImage, Vec<String>)> {
+        let labels = self.fields.iter().find(|field| field.name == "labels");
+        if self.run.input.potential.is_some()
+            || (labels.is_none() && self.run.input.labels.is_none())
+        {
+            return None;
+        }
+        let table = json!({ "features": { "features": "labels" } });
+        let features: RunConfig = serde_json::from_value(table).expect("it is an option");
+        self.run = std::mem::take(&mut self.run).or(features);
+        labels.map(|labels| (labels.image.clone(), labels.units.clone()))
+    }
+
     /// The images in memory, for a mesh of `D` axes.
     ///
     /// # Errors
@@ -229,8 +244,7 @@ pub fn option_names(sections: Option<Vec<String>>) -> Vec<&'static str> {
 }
 
 /// The `TypeError` for a keyword that there is not, with the nearest that there is.
-fn unknown(py: Python<'_>, function: &str, key: &str, sections: &[&str]) -> PyErr {
-    let names = known(sections);
+pub fn unknown(py: Python<'_>, function: &str, key: &str, names: Vec<&str>) -> PyErr {
     let renamed = RENAMED.iter().find(|(name, keyword)| *name == key && names.contains(keyword));
     let nearest = match renamed {
         Some((_, keyword)) => Some((*keyword).to_owned()),

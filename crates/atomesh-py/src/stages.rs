@@ -18,15 +18,16 @@ use pyo3::exceptions::PyRuntimeError;
 use pyo3::prelude::*;
 use pyo3::types::{PyDict, PyType};
 
-use crate::mesh::{Body, Made, Mesh, Opened, Source, placed};
+use crate::mesh::{Body, Made, Mesh, Opened, Source, name_fields, placed};
 use crate::options::{MESH, Wishes};
-use crate::work::{How, pool, work};
+use crate::work::{How, own_pool, work};
 use crate::{arrays, errors};
 
 /// How often signals are asked for while a step is waited for.
 const TICK: Duration = Duration::from_millis(20);
 
 /// How far the atoms have come.
+#[derive(Clone)]
 enum State<const D: usize> {
     /// They fill the box.
     Filled(Filled<D>),
@@ -38,6 +39,8 @@ enum State<const D: usize> {
 
 /// A lattice of either dimension.
 trait LatticeBody: Send {
+    /// One to work on, so that nobody who looks at the atoms meanwhile has to wait for it.
+    fn copy(&self) -> Box<dyn LatticeBody>;
     fn dimension(&self) -> usize;
     /// World coordinates of all atoms.
     fn atoms(&self) -> Vec<f64>;
@@ -76,7 +79,7 @@ trait Moving: Send {
 }
 
 /// Connected atoms of either dimension.
-trait ConnectedBody: Send {
+trait ConnectedBody: Send + Sync {
     fn points(&self) -> Vec<f64>;
     fn corners(&self) -> Vec<u32>;
     fn dimension(&self) -> usize;
@@ -97,6 +100,7 @@ struct Parts<const D: usize> {
     dimension: Dimension<D>,
 }
 
+#[derive(Clone)]
 struct Held<const D: usize> {
     parts: Parts<D>,
     state: State<D>,
@@ -133,6 +137,10 @@ impl<const D: usize> Held<D> {
 }
 
 impl<const D: usize> LatticeBody for Held<D> {
+    fn copy(&self) -> Box<dyn LatticeBody> {
+        Box::new(self.clone())
+    }
+
     fn dimension(&self) -> usize {
         D
     }
@@ -151,10 +159,15 @@ impl<const D: usize> LatticeBody for Held<D> {
             let mut images = images.clone();
             let given = Wishes::given(fields, dimension)?;
             let mut run = run;
-            if given.potential.is_some() {
-                run.input.potential = Some("potential".into());
+            // a number given now replaces an image given before
+            if run.lattice.beta.is_some() {
+                images.weight_field = None;
+            }
+            if run.lattice.size.is_some() || run.lattice.frequency.is_some() {
+                images.size_field = None;
             }
             images.take_given(&run, given, session)?;
+            name_fields(&mut run, &images);
             let (prepared, image) = prepare(&run, images.clone(), dimension, session)?;
             self.parts.images = images;
             (self.parts.run, self.parts.image, self.parts.prepared) = (run, image, prepared);
@@ -234,6 +247,18 @@ type Shared = Arc<Mutex<Box<dyn LatticeBody>>>;
 
 fn own(body: &Shared) -> MutexGuard<'_, Box<dyn LatticeBody>> {
     body.lock().unwrap_or_else(PoisonError::into_inner)
+}
+
+/// Starts moving the atoms again.
+fn restart(
+    body: &Shared,
+    wishes: Option<Wishes>,
+    session: &mut Session<'_>,
+) -> Result<Box<dyn Moving>, JobError> {
+    let mut copy = own(body).copy();
+    let moving = copy.restart(wishes, session)?;
+    *own(body) = copy;
+    Ok(moving)
 }
 
 /// A lattice of atoms in the box of an image: what is moved by `optimize` and joined by `connect`.
@@ -336,7 +361,7 @@ impl Lattice {
         let body = Arc::clone(&self.body);
         let threads = wishes.as_ref().and_then(|wishes| wishes.how.threads);
         let how = How { threads, ..How::default() };
-        let job = move |session: &mut Session<'_>| own(&body).restart(wishes, session);
+        let job = move |session: &mut Session<'_>| restart(&body, wishes, session);
         let (moving, _) = work(py, &how, job)?;
         Steps::start(py, Arc::clone(&self.body), moving, threads)
     }
@@ -361,7 +386,7 @@ impl Lattice {
         let how = wishes.as_mut().map(|wishes| std::mem::take(&mut wishes.how)).unwrap_or_default();
         let body = Arc::clone(&slf.get().body);
         let job = move |session: &mut Session<'_>| {
-            let moving = own(&body).restart(wishes, session)?;
+            let moving = restart(&body, wishes, session)?;
             let settled = moving.run(session)?;
             own(&body).settle(settled);
             Ok(())
@@ -377,9 +402,12 @@ impl Lattice {
     /// Connected
     fn connect(&self, py: Python<'_>) -> PyResult<Connected> {
         let body = Arc::clone(&self.body);
-        let job = move |session: &mut Session<'_>| own(&body).connect(session);
+        let job = move |session: &mut Session<'_>| {
+            let copy = own(&body).copy();
+            copy.connect(session)
+        };
         let (connected, _) = work(py, &How::default(), job)?;
-        Ok(Connected { body: Arc::new(Mutex::new(connected)) })
+        Ok(Connected { body: Arc::new(connected) })
     }
 
     fn __len__(&self) -> usize {
@@ -608,8 +636,8 @@ impl Steps {
     ) -> PyResult<Self> {
         let (to, from) = sync_channel(1);
         let (wants, wanted) = sync_channel(1);
-        let pool = pool(py, threads)?;
-        // a thread of its own: a pool's would be blocked while nobody asks
+        // threads of its own: those of others would be blocked while nobody asks
+        let pool = own_pool(py, threads.unwrap_or(0))?;
         let work = move || {
             if wanted.recv().is_err() {
                 return;
@@ -682,7 +710,7 @@ impl Steps {
 /// Atoms connected by Delaunay's rule, before facets are turned onto features. `Lattice.connect` gives it.
 #[pyclass(frozen, module = "atomesh")]
 pub struct Connected {
-    body: Arc<Mutex<Box<dyn ConnectedBody>>>,
+    body: Arc<Box<dyn ConnectedBody>>,
 }
 
 #[pymethods]
@@ -690,10 +718,7 @@ impl Connected {
     /// The points, shape (n, D), float64, world coordinates.
     #[getter]
     fn points<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyAny>> {
-        let (points, axes) = {
-            let body = self.body.lock().unwrap_or_else(PoisonError::into_inner);
-            (body.points(), body.dimension())
-        };
+        let (points, axes) = (self.body.points(), self.body.dimension());
         let points = numpy::PyArray1::from_vec(py, points).into_any();
         points.call_method1("reshape", ((-1, axes as isize),))
     }
@@ -701,10 +726,7 @@ impl Connected {
     /// The numbers of the points of each cell, shape (m, D + 1), uint32.
     #[getter]
     fn cells<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyAny>> {
-        let (corners, axes) = {
-            let body = self.body.lock().unwrap_or_else(PoisonError::into_inner);
-            (body.corners(), body.dimension())
-        };
+        let (corners, axes) = (self.body.corners(), self.body.dimension());
         let corners = numpy::PyArray1::from_vec(py, corners).into_any();
         corners.call_method1("reshape", ((-1, axes as isize + 1),))
     }
@@ -716,15 +738,13 @@ impl Connected {
     /// Mesh
     fn improve(&self, py: Python<'_>) -> PyResult<Mesh> {
         let body = Arc::clone(&self.body);
-        let job = move |session: &mut Session<'_>| {
-            body.lock().unwrap_or_else(PoisonError::into_inner).improve(session)
-        };
+        let job = move |session: &mut Session<'_>| body.improve(session);
         let (body, notes) = work(py, &How::default(), job)?;
         Mesh::new(py, body, notes.iter().map(errors::words).collect())
     }
 
     fn __repr__(&self) -> String {
-        let body = self.body.lock().unwrap_or_else(PoisonError::into_inner);
-        format!("Connected({} cells)", body.corners().len() / (body.dimension() + 1))
+        let cells = self.body.corners().len() / (self.body.dimension() + 1);
+        format!("Connected({cells} cells)")
     }
 }

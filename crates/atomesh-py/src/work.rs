@@ -26,6 +26,9 @@ const TICK: Duration = Duration::from_millis(20);
 /// How long the caller waits for a job that was told to stop.
 const PATIENCE: Duration = Duration::from_millis(100);
 
+/// How long a job waits for its callback before it looks for other work.
+const TURN: Duration = Duration::from_millis(1);
+
 /// The stack of a thread; nested parallel loops may do another's work on it.
 const STACK: usize = 16 << 20;
 
@@ -111,10 +114,20 @@ impl<T: Send> Watch for Ear<T> {
         let (answer, answered) = channel();
         let event = Event { phase: phase.name(), done, energy };
         let said = self.to.send(Said::Step(event, answer));
-        // a caller that is gone wants no more
-        match said.is_ok() && answered.recv().unwrap_or(false) {
-            true => ControlFlow::Continue(()),
-            false => ControlFlow::Break(()),
+        if said.is_err() {
+            return ControlFlow::Break(());
+        }
+        loop {
+            match answered.recv_timeout(TURN) {
+                Ok(true) => return ControlFlow::Continue(()),
+                // the callback may have a job of its own for this very thread
+                Err(RecvTimeoutError::Timeout) => drop(rayon::yield_now()),
+                // a caller that is gone wants no more; where a phase begins nobody hears of it, so it is kept
+                Ok(false) | Err(RecvTimeoutError::Disconnected) => {
+                    self.stop.store(true, Ordering::Relaxed);
+                    return ControlFlow::Break(());
+                }
+            }
         }
     }
 }
@@ -217,13 +230,17 @@ pub fn pool(py: Python<'_>, threads: Option<usize>) -> PyResult<Arc<ThreadPool>>
     if let Some((_, _, pool)) = pools.iter().find(|(_, of, _)| *of == threads) {
         return Ok(Arc::clone(pool));
     }
+    let pool = Arc::new(own_pool(py, threads)?);
+    pools.push((process, threads, Arc::clone(&pool)));
+    Ok(pool)
+}
+
+/// Threads that no other job has; 0 for one a core.
+pub fn own_pool(py: Python<'_>, threads: usize) -> PyResult<ThreadPool> {
     let made = py.detach(|| {
         let name = |number| format!("atomesh-{number}");
         let builder = rayon::ThreadPoolBuilder::new().num_threads(threads);
         builder.stack_size(STACK).thread_name(name).build()
     });
-    let pool = made.map_err(|e| PyRuntimeError::new_err(format!("no threads: {e}")))?;
-    let pool = Arc::new(pool);
-    pools.push((process, threads, Arc::clone(&pool)));
-    Ok(pool)
+    made.map_err(|e| PyRuntimeError::new_err(format!("no threads: {e}")))
 }

@@ -78,7 +78,7 @@ def page(folder: Path) -> None:
     own = am.Lattice.of(lat.atoms, img, size=8)
     assert_type(own.settle(progress=False).connect().improve(), am.Mesh)
 
-    ed = mesh.edit(img)
+    ed = mesh.edit()
     atom = ed.add((20.5, 30.25))
     ed.move(atom, (21, 30))
     ed.relax(atom, reach=5)

@@ -44,7 +44,7 @@ def image_of(obj: Any) -> Image:
                 return convert(obj)
     if type(obj).__module__.partition(".")[0] == "itk" and hasattr(obj, "GetLargestPossibleRegion"):
         return _of_itk(obj)
-    if hasattr(obj, "__array__") or hasattr(obj, "__array_interface__") or isinstance(obj, (list, tuple)):
+    if hasattr(obj, "__array__") or hasattr(obj, "__array_interface__") or isinstance(obj, (list, tuple, memoryview)):
         return Image(obj)
     raise TypeError(
         f"{type(obj).__module__}.{type(obj).__qualname__} is no image that is known; expected an array, atomesh.Image, a path, "
@@ -209,7 +209,8 @@ def to_meshio(mesh: "Mesh") -> Any:
     _simplices(mesh, "to_meshio()")
     facets = {name: group for name, group in mesh.facets.items() if len(group)}
     kind = "line" if mesh.dim == 2 else "triangle"
-    cells = [(_cell_kind(mesh), mesh.cells), *((kind, group) for group in facets.values())]
+    # not all of meshio's writers know unsigned integers
+    cells = [(_cell_kind(mesh), mesh.cells.astype(np.int64)), *((kind, group.astype(np.int64)) for group in facets.values())]
     counts = [len(block) for _, block in cells]
     # a value for each block: facets have none
     cell_data = {
@@ -222,10 +223,18 @@ def to_meshio(mesh: "Mesh") -> Any:
         return [indices if i == at else np.empty(0, np.int64) for i in range(len(cells))]
 
     sets = {name: alone(i, np.arange(counts[i])) for i, name in enumerate(facets, start=1)}
+    regions = np.zeros(len(mesh.cells), np.int32) if mesh.regions is None else mesh.regions
     if mesh.regions is not None:
         for number, name in mesh.region_names.items():
-            sets[name] = alone(0, np.flatnonzero(mesh.regions == number))
-    return meshio.Mesh(mesh.points, cells, point_data=dict(mesh.point_data), cell_data=cell_data, cell_sets=sets)
+            sets[name] = alone(0, np.flatnonzero(regions == number))
+    # Gmsh's files have numbers, and names of these
+    tags = [regions, *(np.full(n, i, np.int32) for i, n in enumerate(counts[1:], start=1))]
+    cell_data["gmsh:physical"], cell_data["gmsh:geometrical"] = tags, tags
+    names = {name: np.array([i, mesh.dim - 1]) for i, name in enumerate(facets, start=1)}
+    names |= {name: np.array([number, mesh.dim]) for number, name in mesh.region_names.items()}
+    return meshio.Mesh(
+        mesh.points, cells, point_data=dict(mesh.point_data), cell_data=cell_data, cell_sets=sets, field_data=names
+    )
 
 
 FACETS = "facets "  # what names of groups of facets begin with in a grid's field data

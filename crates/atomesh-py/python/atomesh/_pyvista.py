@@ -50,4 +50,4 @@ def read_mesh(path: str) -> pyvista.UnstructuredGrid:
 
 def write_mesh(grid: pyvista.DataSet, path: str) -> None:
     """Triangles in a plane, or tetrahedra, for `save` of pyvista's grids."""
-    _atomesh.Mesh.of(grid).write(path)  # type: ignore[attr-defined]
+    _atomesh.Mesh.of(grid).write(path)

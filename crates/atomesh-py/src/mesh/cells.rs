@@ -223,7 +223,7 @@ impl<const D: usize> Body for CellsBody<D> {
     }
 
     fn editor(&self, session: &mut Session<'_>) -> Result<Box<dyn EditorBody>, JobError> {
-        let made = self.made.as_ref().ok_or_else(|| of_file("edit"))?;
+        let made = self.made.as_ref().ok_or_else(super::not_made)?;
         let sites = made.outcome.cells().and_then(PolyMesh::sites).unwrap_or_default();
         crate::edit::editor(made, sites, self.dimension.clone(), session)
     }

@@ -162,7 +162,12 @@ impl<const D: usize> Body for SimplexBody<D> {
             false => (Vec::new(), vec![name.to_owned()]),
         };
         let request = SurfacesRequest { group, region, ..Default::default() };
-        let mut found = surfaces(&request, &self.loaded)?;
+        let names = || self.groups.iter().map(|(name, _)| name.as_str()).collect::<Vec<_>>();
+        let mut found =
+            surfaces(&request, &self.loaded).map_err(|e| match request.region.is_empty() {
+                true => e,
+                false => JobError::misuse(format!("{e}, and groups {}", names().join(", "))),
+            })?;
         let FacetGroup { name, facets, .. } = found.swap_remove(0);
         Ok(Surface::new(name, self.loaded.mesh.points(), &facets, Value::Null))
     }
@@ -208,7 +213,7 @@ impl<const D: usize> Body for SimplexBody<D> {
     }
 
     fn editor(&self, session: &mut Session<'_>) -> Result<Box<dyn EditorBody>, JobError> {
-        let made = self.made.as_ref().ok_or_else(|| of_file("edit"))?;
+        let made = self.made.as_ref().ok_or_else(super::not_made)?;
         crate::edit::editor(made, made.outcome.mesh().points(), self.dimension.clone(), session)
     }
 }
