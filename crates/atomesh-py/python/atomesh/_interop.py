@@ -60,8 +60,8 @@ def _of_simpleitk(image: Any) -> Image:
         raise InputError(f"an image of {image.GetNumberOfComponentsPerPixel()} components a sample; expected one")
     if axes not in (2, 3):
         raise InputError(f"an image of {axes} axes; expected 2 or 3")
-    # a view keeps the image alive and is read-only
-    array = SimpleITK.GetArrayViewFromImage(image)
+    # a copy: a view does not keep the image alive, and would show memory that is another's by then
+    array = SimpleITK.GetArrayFromImage(image)
     direction = np.reshape(image.GetDirection(), (axes, axes))
     return _in_ras(array, image.GetSpacing(), image.GetOrigin(), direction)
 
