@@ -28,7 +28,7 @@
 //!
 //! let mut grey = vec![200u8; 64 * 48];
 //! grey[24 * 64 + 16..24 * 64 + 48].fill(10); // a dark row that ends within the image
-//! let image = Image::new(Frame::new([64, 48])?, Samples::U8(grey))?;
+//! let image = Image::new(Frame::new([64, 48])?, Samples::U8(grey.into()))?;
 //!
 //! let lattice = LatticeOptions { size: Some("6".parse()?), ..Default::default() };
 //! let run = RunConfig { lattice, ..Default::default() };

@@ -70,7 +70,7 @@ pub struct Enhanced<const D: usize> {
 ///
 /// let mut grey = vec![153u8; 64];
 /// grey[24..32].fill(7); // a dark row
-/// let image = Image::new(Frame::new([8, 8])?, Samples::U8(grey))?;
+/// let image = Image::new(Frame::new([8, 8])?, Samples::U8(grey.into()))?;
 /// let sharp = FeatureOptions { smooth: Some(0.0), ..Default::default() };
 /// let b = enhance(&image, &sharp, &mut atomesh::watch::Silent)?;
 /// assert_eq!((b.values[0], b.values[27]), (0.0, -1.0));

@@ -20,7 +20,7 @@
 //!
 //! let mut grey = vec![200u8; 64 * 48];
 //! grey[24 * 64..25 * 64].fill(10); // a dark row
-//! let image = Image::new(Frame::new([64, 48])?, Samples::U8(grey))?;
+//! let image = Image::new(Frame::new([64, 48])?, Samples::U8(grey.into()))?;
 //! let options = MeshOptions { size: Size::Constant(6.0), ..Default::default() };
 //! let settled = prepare(&Method::plane(), Inputs::image(&image), options, &mut Silent)?
 //!     .fill(&mut Silent)?
