@@ -119,8 +119,12 @@ pub(crate) fn scaled<const D: usize>(frame: &Frame<D>, ratio: f64) -> Result<Fra
 
 /// Whether a file says where its samples are: a frame of unit steps at 0 is that of headers that say nothing.
 pub(crate) fn is_placed<const D: usize>(path: &Path, frame: &Frame<D>) -> bool {
-    let unit = Frame::new(frame.shape());
-    ImageFormat::of(path).is_some_and(ImageFormat::has_frame) && unit.as_ref() != Ok(frame)
+    ImageFormat::of(path).is_some_and(ImageFormat::has_frame) && !is_bare(frame)
+}
+
+/// Whether a frame is that of samples of which nothing is known but their number: unit steps, the first at 0.
+pub fn is_bare<const D: usize>(frame: &Frame<D>) -> bool {
+    Frame::new(frame.shape()).as_ref() == Ok(frame)
 }
 
 /// A reader's note, with the option that decides otherwise where there is one.

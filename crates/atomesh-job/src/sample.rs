@@ -115,13 +115,8 @@ enum Numbers {
 }
 
 impl Property {
-    /// Values of which each fills one cell, in the precision in which they are given.
+    /// A value for each cell, kept in single precision if nothing is lost.
     pub fn new(name: String, values: Vec<f64>) -> Self {
-        Self::exact(name, values)
-    }
-
-    /// In single precision if nothing is lost.
-    fn exact(name: String, values: Vec<f64>) -> Self {
         let kept = |v: &f64| v.is_nan() || f64::from(*v as f32) == *v;
         if values.iter().all(kept) {
             Self::single(name, values)
@@ -190,7 +185,7 @@ pub fn sample<const D: usize>(
         };
         properties.push(match statistic {
             Statistic::Total => Property::double(name, values),
-            Statistic::Majority => Property::exact(name, values),
+            Statistic::Majority => Property::new(name, values),
             _ => Property::single(name, values),
         });
     }
@@ -246,7 +241,7 @@ fn run<const D: usize>(
     }
     let old = loaded.take_fields().into_iter();
     let old = old.filter(|field| found.iter().all(|new| new.name != field.name));
-    let mut all: Vec<Property> = old.map(|f| Property::exact(f.name, f.values)).collect();
+    let mut all: Vec<Property> = old.map(|f| Property::new(f.name, f.values)).collect();
     all.extend(found);
     session.write_together(|group, session| {
         let path = files::stage(&request.output, group)?;

@@ -8,7 +8,7 @@ use atomesh_io::image::{LoadedImage, Meaning, ReadOptions};
 
 use crate::dimension::Dimension;
 use crate::error::JobError;
-use crate::images::{self, is_placed, scaled, unit_ratio};
+use crate::images::{self, is_bare, is_placed, scaled, unit_ratio};
 use crate::labels;
 use crate::memory;
 use crate::options::{FrameOptions, RunConfig};
@@ -39,11 +39,18 @@ struct FieldKind {
 }
 
 impl FieldKind {
-    fn values(name: &'static str, outside: Option<f64>) -> Self {
+    const SIZE: Self = Self::values("size_field", None);
+    const WEIGHT: Self = Self::values("beta_field", None);
+    const MASK: Self = Self::whole("mask", Meaning::Mask);
+    const LABELS: Self = Self::whole("labels", Meaning::Labels);
+    /// Outside of its file there are no features.
+    const POTENTIAL: Self = Self::values("potential", Some(0.0));
+
+    const fn values(name: &'static str, outside: Option<f64>) -> Self {
         Self { name, meaning: Meaning::Brightness, between: Between::Linear { outside } }
     }
 
-    fn whole(name: &'static str, meaning: Meaning) -> Self {
+    const fn whole(name: &'static str, meaning: Meaning) -> Self {
         Self { name, meaning, between: Between::Nearest }
     }
 }
@@ -149,19 +156,15 @@ impl<const D: usize> MeshImages<D> {
             };
             source.in_place(run, &of, kind.between, session).map(Some)
         };
-        let size = FieldKind::values("size_field", None);
-        let size_field = field(given.size_field, input.size_field.as_deref(), size)?;
-        let weight = FieldKind::values("beta_field", None);
-        let weight_field = field(given.weight_field, input.beta_field.as_deref(), weight)?;
-        let mask = FieldKind::whole("mask", Meaning::Mask);
-        let mask = field(given.mask, input.mask_file(), mask)?;
-        let labels = FieldKind::whole("labels", Meaning::Labels);
-        let labels = field(given.labels, input.labels.as_deref(), labels)?;
-        // without IMAGE, the potential is the image; outside of its file there are no features
-        let no_feature = FieldKind::values("potential", Some(0.0));
+        let size_field = field(given.size_field, input.size_field.as_deref(), FieldKind::SIZE)?;
+        let weight = input.beta_field.as_deref();
+        let weight_field = field(given.weight_field, weight, FieldKind::WEIGHT)?;
+        let mask = field(given.mask, input.mask_file(), FieldKind::MASK)?;
+        let labels = field(given.labels, input.labels.as_deref(), FieldKind::LABELS)?;
+        // without IMAGE, the potential is the image
         let is_beside = input.image.is_some() || given.potential.is_some();
         let beside = input.potential.as_deref().filter(|_| is_beside);
-        let potential = field(given.potential, beside, no_feature)?;
+        let potential = field(given.potential, beside, FieldKind::POTENTIAL)?;
         let is_potential = input.potential.is_some() && potential.is_none();
         let mask = match input.masks_absent() {
             true => live_mask(&image, shown, session),
@@ -187,11 +190,11 @@ impl<const D: usize> MeshImages<D> {
             let source = given.map(|given| FieldSource::of(given, &kind, session)).transpose()?;
             source.map(|s| s.in_place(&none, &of, kind.between, session)).transpose()
         };
-        let potential = field(given.potential, FieldKind::values("potential", Some(0.0)))?;
-        let size_field = field(given.size_field, FieldKind::values("size_field", None))?;
-        let weight_field = field(given.weight_field, FieldKind::values("beta_field", None))?;
-        let mask = field(given.mask, FieldKind::whole("mask", Meaning::Mask))?;
-        let labels = field(given.labels, FieldKind::whole("labels", Meaning::Labels))?;
+        let potential = field(given.potential, FieldKind::POTENTIAL)?;
+        let size_field = field(given.size_field, FieldKind::SIZE)?;
+        let weight_field = field(given.weight_field, FieldKind::WEIGHT)?;
+        let mask = field(given.mask, FieldKind::MASK)?;
+        let labels = field(given.labels, FieldKind::LABELS)?;
         self.potential = potential.or(self.potential.take());
         self.size_field = size_field.or(self.size_field.take());
         self.weight_field = weight_field.or(self.weight_field.take());
@@ -374,11 +377,6 @@ impl<'a, const D: usize> FieldSource<'a, D> {
         note_filled(&field, run, file, session);
         run.frame.place(field).map_err(|e| e.about(file))
     }
-}
-
-/// Whether a frame is that of samples of which nothing is known but their number: unit steps, the first at 0.
-fn is_bare<const D: usize>(frame: &Frame<D>) -> bool {
-    Frame::new(frame.shape()).as_ref() == Ok(frame)
 }
 
 /// Says how many samples of a field get the value of `--fill`.

@@ -90,7 +90,7 @@ impl<const D: usize> MadeMesh<'_, D> {
     /// The report, with all that is measured against the image.
     ///
     /// # Errors
-    /// [`JobError`] if there is no image, the mesh cannot be measured, or the watch ends the work.
+    /// [`JobError`] if the image is missing, the mesh cannot be measured, or the watch ends the work.
     pub fn report(
         &self,
         dimension: &Dimension<D>,

@@ -259,10 +259,15 @@ impl RunConfig {
 
     /// Labels alone are the image, and the boundaries between them its features.
     pub(crate) fn take_labels_alone(&mut self) {
-        let Self { input, features, .. } = self;
+        let input = &self.input;
         if input.image.is_none() && input.potential.is_none() && input.labels.is_some() {
-            features.features.get_or_insert(Text(Features::Labels.into()));
+            self.follow_labels();
         }
+    }
+
+    /// Makes the boundaries between labels the features, unless others are asked for.
+    pub fn follow_labels(&mut self) {
+        self.features.features.get_or_insert(Text(Features::Labels.into()));
     }
 }
 

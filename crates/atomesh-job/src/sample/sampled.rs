@@ -168,7 +168,7 @@ impl<const D: usize> SampledMesh<D> for LoadedCells<D> {
     }
 }
 
-/// Properties of so many cells, to be written with them.
+/// The properties of a mesh of `cell_count` cells, as its file takes them.
 ///
 /// # Errors
 /// [`MeshDataError`] if values are not one a cell, or a name does not fit the format.
