@@ -16,7 +16,9 @@ use crate::errors;
 
 /// Keeps alive what an array shows.
 #[pyclass(frozen, module = "atomesh._atomesh")]
-struct Keeper(#[allow(dead_code)] Arc<dyn Any + Send + Sync>);
+struct Keeper {
+    _kept: Arc<dyn Any + Send + Sync>,
+}
 
 /// A read-only array that shows a part of `owner` without a copy.
 pub fn view<'py, O, T>(
@@ -32,7 +34,7 @@ where
     let data = part(owner);
     let view = ArrayView::from_shape(IxDyn(shape), data);
     let view = view.map_err(|e| errors::input(py, e))?;
-    let keeper = Bound::new(py, Keeper(Arc::clone(owner) as Arc<dyn Any + Send + Sync>))?;
+    let keeper = Bound::new(py, Keeper { _kept: Arc::clone(owner) as _ })?;
     // SAFETY: `data` is borrowed from what the Arc holds, which neither moves nor changes while the Arc lives, and the
     // keeper, the array's base, holds the Arc as long as the array lives.
     let array = unsafe { PyArray::borrow_from_array(&view, keeper.into_any()) };
@@ -78,7 +80,7 @@ pub fn plain<'py>(given: &Bound<'py, PyAny>) -> PyResult<Bound<'py, PyUntypedArr
     let shape = array.shape();
     if !(2..=3).contains(&shape.len()) {
         let message = format!(
-            "an array of shape {shape:?}; expected two axes (y, x) or three (z, y, x); colours and channels are no axes"
+            "an array of shape {shape:?}; expected two axes (y, x) or three (z, y, x); colours and channels are not axes"
         );
         return Err(errors::input(py, message));
     }
@@ -158,6 +160,16 @@ pub fn of_samples<'py, O: Any + Send + Sync>(
         };
     }
     Ok(shown!(U8, I8, U16, I16, U32, I32, F32, F64))
+}
+
+/// An array of so many columns that takes over values, row by row.
+pub fn rows<T: Element>(
+    py: Python<'_>,
+    values: Vec<T>,
+    columns: usize,
+) -> PyResult<Bound<'_, PyAny>> {
+    let array = PyArray::from_vec(py, values).into_any();
+    array.call_method1("reshape", ((-1, columns as isize),))
 }
 
 /// Numbers, one after another, from whatever NumPy takes for an array.

@@ -47,7 +47,7 @@ pub trait EditorBody: Send {
     /// Optimizes the atoms within reach of one again.
     ///
     /// # Errors
-    /// [`JobError`] if there is no such atom, or the reach is no length.
+    /// [`JobError`] if there is no such atom, or the reach is not a length.
     fn relax(
         &mut self,
         atom: u32,
@@ -258,8 +258,7 @@ impl Editor {
             let (names, places) = body.atoms();
             Ok((names, places, body.dimension()))
         })?;
-        let places = numpy::PyArray1::from_vec(py, places).into_any();
-        let places = places.call_method1("reshape", ((-1, axes as isize),))?;
+        let places = arrays::rows(py, places, axes)?;
         Ok((numpy::PyArray1::from_vec(py, names).into_any(), places))
     }
 
@@ -376,7 +375,7 @@ impl Editor {
         let body = Arc::clone(&self.body);
         let job = move |session: &mut Session<'_>| own(&body).mesh(session);
         let (body, notes) = work(py, &How::default(), job)?;
-        Mesh::new(py, body, notes.iter().map(errors::words).collect())
+        Mesh::new(py, body, notes)
     }
 
     fn __repr__(&self, py: Python<'_>) -> PyResult<String> {

@@ -399,13 +399,9 @@ impl Flow {
         let Facets { cells, areas, centroids, groups } = self.shared.0.facets();
         let table = PyDict::new(py);
         let axes = self.shared.0.dimension();
-        let rows = |array: Bound<'py, PyAny>, columns: usize| {
-            array.call_method1("reshape", ((-1, columns as isize),))
-        };
-        table.set_item("cells", rows(numpy::PyArray1::from_vec(py, cells).into_any(), 2)?)?;
-        table.set_item("area", rows(numpy::PyArray1::from_vec(py, areas).into_any(), axes)?)?;
-        let centroids = numpy::PyArray1::from_vec(py, centroids).into_any();
-        table.set_item("centroid", rows(centroids, axes)?)?;
+        table.set_item("cells", arrays::rows(py, cells, 2)?)?;
+        table.set_item("area", arrays::rows(py, areas, axes)?)?;
+        table.set_item("centroid", arrays::rows(py, centroids, axes)?)?;
         table.set_item("group", groups)?;
         Ok(table)
     }

@@ -13,7 +13,7 @@ use pyo3::types::{PyDict, PyString, PyTuple, PyType};
 
 use crate::arrays;
 use crate::errors;
-use crate::options::Wishes;
+use crate::options::{Field, Wishes};
 use crate::work::work;
 
 /// An image: samples on a regular grid, and the frame that says where they are.
@@ -371,7 +371,7 @@ pub fn read(py: Python<'_>, path: PathBuf, options: Option<&Bound<'_, PyDict>>) 
         };
         Ok((image, units))
     })?;
-    Ok(Image::new(image, units, notes.iter().map(errors::words).collect()))
+    Ok(Image::new(image, units, notes))
 }
 
 /// Takes out of keywords what the samples mean.
@@ -448,7 +448,7 @@ pub fn enhance(
             enhanced(&run, image.clone(), units, &Dimension::space(), session).map(AnyImage::Volume)
         }
     })?;
-    Ok(Image::new(made, of, notes.iter().map(errors::words).collect()))
+    Ok(Image::new(made, of, notes))
 }
 
 fn enhanced<const D: usize>(
@@ -503,21 +503,26 @@ pub fn size_field(
     let (given, of) = (Arc::clone(&image.get().any), image.get().units.clone());
     let (made, notes) = work(py, &how, move |session| match &*given {
         AnyImage::Flat(image) => {
-            let dimension = Dimension::plane();
-            let given = Wishes::given(fields, &dimension)?;
-            let images = MeshImages::with_fields(&run, image.clone(), given, &dimension, session)?;
-            let (prepared, image) = prepare(&run, images, &dimension, session)?;
-            let values = Samples::F32(prepared.distance_at_samples().into());
-            image.with_samples(values).map(AnyImage::Flat).map_err(JobError::content)
+            distances(&run, image.clone(), fields, &Dimension::plane(), session).map(AnyImage::Flat)
         }
         AnyImage::Volume(image) => {
-            let dimension = Dimension::space();
-            let given = Wishes::given(fields, &dimension)?;
-            let images = MeshImages::with_fields(&run, image.clone(), given, &dimension, session)?;
-            let (prepared, image) = prepare(&run, images, &dimension, session)?;
-            let values = Samples::F32(prepared.distance_at_samples().into());
-            image.with_samples(values).map(AnyImage::Volume).map_err(JobError::content)
+            distances(&run, image.clone(), fields, &Dimension::space(), session)
+                .map(AnyImage::Volume)
         }
     })?;
-    Ok(Image::new(made, of, notes.iter().map(errors::words).collect()))
+    Ok(Image::new(made, of, notes))
+}
+
+fn distances<const D: usize>(
+    run: &RunConfig,
+    image: atomesh::image::Image<D>,
+    fields: Vec<Field>,
+    dimension: &Dimension<D>,
+    session: &mut Session<'_>,
+) -> Result<atomesh::image::Image<D>, JobError> {
+    let given = Wishes::given(fields, dimension)?;
+    let images = MeshImages::with_fields(run, image, given, dimension, session)?;
+    let (prepared, image) = prepare(run, images, dimension, session)?;
+    let values = Samples::F32(prepared.distance_at_samples().into());
+    image.with_samples(values).map_err(JobError::content)
 }

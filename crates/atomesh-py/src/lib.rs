@@ -3,7 +3,7 @@
 //! Nothing of the pipeline is here. [`options`] turns keywords into the options of a run, [`arrays`] NumPy arrays into
 //! samples and meshes into arrays, [`errors`] refusals into exceptions. [`work`] does a job on threads of its own while
 //! the caller's thread listens for Ctrl-C and calls back. [`image`], [`mesh`], [`flow`], [`surface`], [`stages`] and
-//! [`edit`] are the classes; a class holds either dimension behind a trait, or an enum where there are two lines to do.
+//! [`edit`] are the classes, [`source`] what meshes and lattices are made from; a class holds either dimension behind a trait, or an enum where there are two lines to do.
 //!
 //! What needs other Python packages (`meshio`, `pyvista` ...) is written in Python beside this module, and imported when
 //! it is asked for.
@@ -17,6 +17,7 @@ mod image;
 mod json;
 mod mesh;
 mod options;
+mod source;
 mod stages;
 mod surface;
 mod work;
@@ -41,7 +42,9 @@ mod _atomesh {
     #[pymodule_export]
     use super::options::option_names;
     #[pymodule_export]
-    use super::stages::{Connected, Lattice, Step, Steps, lattice};
+    use super::stages::steps::{Step, Steps};
+    #[pymodule_export]
+    use super::stages::{Connected, Lattice, lattice};
     #[pymodule_export]
     use super::surface::Surface;
     #[pymodule_export]

@@ -2,6 +2,7 @@
 
 mod body;
 mod cells;
+mod given;
 mod simplices;
 
 use std::collections::BTreeMap;
@@ -9,16 +10,15 @@ use std::path::PathBuf;
 use std::sync::Arc;
 
 use atomesh::image::{Frame, Image as CoreImage};
-use atomesh::mesh::{FacetGroup, Mesh as CoreMesh, Regions, Tags};
 use atomesh::run::Outcome;
 use atomesh_draw::{DrawError, Picture, PictureFormat};
-use atomesh_io::image::{AnyImage, LoadedImage};
-use atomesh_io::mesh::{LoadedMesh, OwnedField};
-use atomesh_job::mesh::{MadeMesh, MeshImages, ShownImage, prepare, read_shown};
+use atomesh_io::image::AnyImage;
+use atomesh_job::images::is_bare;
+use atomesh_job::mesh::{MadeMesh, MeshImages, prepare};
 use atomesh_job::options::{OutputOptions, RunConfig};
 use atomesh_job::sample::{Property, SampledMesh};
 use atomesh_job::{Dimension, JobError, Session};
-use pyo3::exceptions::{PyKeyError, PyTypeError};
+use pyo3::exceptions::PyKeyError;
 use pyo3::prelude::*;
 use pyo3::types::{PyBytes, PyDict, PyMapping, PyType};
 
@@ -26,13 +26,15 @@ use crate::arrays;
 use crate::edit::Editor;
 use crate::errors;
 use crate::flow::{self, Flow};
-use crate::image::{Image, is_path};
+use crate::image::Image;
 use crate::json;
-use crate::options::{Field, MESH, Wishes};
+use crate::options::{MESH, Wishes};
+use crate::source::{Opened, Shown, Source};
 use crate::surface::Surface;
 use crate::work::work;
 pub use body::Body;
 use cells::CellsBody;
+use given::GivenMesh;
 use simplices::SimplexBody;
 
 /// A mesh that a run has made, with what it was made from.
@@ -160,8 +162,8 @@ impl Mesh {
         let parts: GivenMesh<'_> = parts.extract()?;
         let axes: usize = parts.points.getattr("shape")?.get_item(1)?.extract()?;
         let body = match axes {
-            2 => given(py, &parts, Dimension::plane())?,
-            _ => given(py, &parts, Dimension::space())?,
+            2 => given::body(py, &parts, Dimension::plane())?,
+            _ => given::body(py, &parts, Dimension::space())?,
         };
         let mesh = Self::new(py, body, Vec::new())?;
         mesh.cell_data.bind(py).update(parts.cell_data.as_mapping())?;
@@ -547,7 +549,7 @@ impl Mesh {
         fields.extend(own);
         let shared = Arc::clone(&self.shared);
         let (body, notes) = work(py, &how, move |session| shared.0.flow(&flow, fields, session))?;
-        Ok(Flow::new(body, notes.iter().map(errors::words).collect()))
+        Ok(Flow::new(body, notes))
     }
 
     /// Writes the mesh, with its values, groups of facets and regions.
@@ -682,164 +684,9 @@ impl Mesh {
     }
 }
 
-/// A mesh of another's making, as `_interop.mesh_parts` takes it apart.
-#[derive(FromPyObject)]
-struct GivenMesh<'py> {
-    points: Bound<'py, PyAny>,
-    cells: Bound<'py, PyAny>,
-    facets: Bound<'py, PyDict>,
-    regions: Option<Vec<i32>>,
-    region_names: BTreeMap<i32, String>,
-    point_data: Bound<'py, PyDict>,
-    cell_data: Bound<'py, PyDict>,
-}
-
-/// The mesh of such parts.
-fn given<const D: usize>(
-    py: Python<'_>,
-    parts: &GivenMesh<'_>,
-    dimension: Dimension<D>,
-) -> PyResult<Box<dyn Body>> {
-    let refused = |e: &dyn std::fmt::Display| errors::input(py, e);
-    let numbers = |given: &Bound<'_, PyAny>, corners: usize| -> PyResult<Vec<u32>> {
-        let rows = arrays::indices(given)?;
-        match rows.shape()[..] {
-            [_, columns] if columns == corners => Ok(rows.iter().copied().collect()),
-            ref other => {
-                let message =
-                    format!("cells or facets of shape {other:?}; expected (m, {corners})");
-                Err(errors::input(py, message))
-            }
-        }
-    };
-    let points = arrays::points::<D>(&parts.points)?;
-    let mesh = CoreMesh::new(points, numbers(&parts.cells, D + 1)?).map_err(|e| refused(&e))?;
-    let mut groups = Vec::new();
-    for (number, (name, facets)) in (1..).zip(&parts.facets) {
-        let facets = numbers(&facets, D)?.as_chunks::<D>().0.to_vec();
-        groups.push(FacetGroup { id: number, name: name.extract()?, facets });
-    }
-    let names = parts.region_names.clone().into_iter().collect();
-    let regions = parts.regions.clone().map(|of_cells| Regions { of_cells, names });
-    let tags = Tags::new(&mesh, groups, regions).map_err(|e| refused(&e))?;
-    let mut point_fields = Vec::new();
-    for (name, values) in &parts.point_data {
-        let values = arrays::numbers(&values)?.into_iter().map(|v| v as f32).collect();
-        point_fields.push(OwnedField { name: name.extract()?, values });
-    }
-    let loaded = LoadedMesh {
-        mesh,
-        point_fields,
-        tags,
-        cell_fields: Vec::new(),
-        frame: None,
-        provenance: None,
-        skipped_cells: 0,
-    };
-    Ok(Box::new(SimplexBody::new(loaded, None, dimension)))
-}
-
 /// Calls a function of the package's that needs others' packages.
 fn interop<'py>(mesh: &Bound<'py, Mesh>, function: &str) -> PyResult<Bound<'py, PyAny>> {
     mesh.py().import("atomesh._interop")?.call_method1(function, (mesh,))
-}
-
-/// What a mesh is made from.
-pub enum Source {
-    /// A file, read with the options of the run.
-    File,
-    /// An image in memory.
-    Given(AnyImage, Vec<String>),
-    /// A potential in memory, and no image.
-    Potential(AnyImage, Vec<String>),
-}
-
-impl Source {
-    /// Takes the first argument of functions that mesh.
-    pub fn take(image: &Bound<'_, PyAny>, wishes: &mut Wishes) -> PyResult<Self> {
-        if image.is_none() {
-            let at = wishes.fields.iter().position(Field::is_potential);
-            return match at {
-                Some(at) => {
-                    let (image, units) = wishes.fields.remove(at).into_image();
-                    Ok(Self::Potential(image, units))
-                }
-                None => match wishes.labels_alone() {
-                    Some((image, units)) => Ok(Self::Given(image, units)),
-                    None if wishes.run.input.shown().is_some() => Ok(Self::File),
-                    None => {
-                        let message = "no image; expected one, or potential= or labels=";
-                        Err(PyTypeError::new_err(message))
-                    }
-                },
-            };
-        }
-        if is_path(image) {
-            wishes.run.input.image = Some(image.extract()?);
-            return Ok(Self::File);
-        }
-        let image = Image::like(image)?;
-        Ok(Self::Given(image.get().any().clone(), image.get().units().to_vec()))
-    }
-
-    /// The images that a mesh is made from.
-    ///
-    /// # Errors
-    /// [`JobError`] if a file cannot be used, or an image is of no use.
-    pub fn open(self, run: &mut RunConfig, session: &mut Session<'_>) -> Result<Opened, JobError> {
-        let (image, units, is_potential) = match self {
-            Self::File => {
-                let LoadedImage { image, units, .. } = read_shown(run, session)?;
-                (image, units, false)
-            }
-            Self::Given(image, units) => (image, units, false),
-            Self::Potential(image, units) => (image, units, true),
-        };
-        Ok(Opened { image, units, is_potential })
-    }
-}
-
-/// The image that gives the frame.
-pub struct Opened {
-    pub image: AnyImage,
-    pub units: Vec<String>,
-    pub is_potential: bool,
-}
-
-/// The images of a run, placed.
-///
-/// # Errors
-/// [`JobError`] if an image is of no use.
-pub fn placed<const D: usize>(
-    run: &mut RunConfig,
-    shown: ShownImage<D>,
-    is_potential: bool,
-    fields: Vec<Field>,
-    dimension: &Dimension<D>,
-    session: &mut Session<'_>,
-) -> Result<MeshImages<D>, JobError> {
-    let given = Wishes::given(fields, dimension)?;
-    let mut images = MeshImages::with_fields(run, shown, given, dimension, session)?;
-    images.is_potential |= is_potential;
-    name_fields(run, &images);
-    Ok(images)
-}
-
-/// Names images in memory as files would be: options that they replace have no part in the run then.
-pub fn name_fields<const D: usize>(run: &mut RunConfig, images: &MeshImages<D>) {
-    let MeshImages { is_potential, potential, size_field, weight_field, mask, labels, .. } = images;
-    let input = &mut run.input;
-    for (path, is_there, name) in [
-        (&mut input.potential, *is_potential || potential.is_some(), "potential"),
-        (&mut input.size_field, size_field.is_some(), "size_field"),
-        (&mut input.beta_field, weight_field.is_some(), "beta_field"),
-        (&mut input.mask, mask.is_some(), "mask"),
-        (&mut input.labels, labels.is_some(), "labels"),
-    ] {
-        if is_there && path.is_none() {
-            *path = Some(name.into());
-        }
-    }
 }
 
 /// Meshes an image.
@@ -917,19 +764,19 @@ pub fn mesh(
         match image {
             AnyImage::Flat(image) => {
                 let dimension = Dimension::plane();
-                let shown = ShownImage { image, units };
-                let images = placed(&mut run, shown, is_potential, fields, &dimension, session)?;
+                let shown = Shown { image, units, is_potential, fields };
+                let images = shown.placed(&mut run, &dimension, session)?;
                 made(run, images, dimension, session)
             }
             AnyImage::Volume(image) => {
                 let dimension = Dimension::space();
-                let shown = ShownImage { image, units };
-                let images = placed(&mut run, shown, is_potential, fields, &dimension, session)?;
+                let shown = Shown { image, units, is_potential, fields };
+                let images = shown.placed(&mut run, &dimension, session)?;
                 made(run, images, dimension, session)
             }
         }
     })?;
-    Mesh::new(py, body, notes.iter().map(errors::words).collect())
+    Mesh::new(py, body, notes)
 }
 
 fn made<const D: usize>(
@@ -975,7 +822,7 @@ pub fn read_mesh(py: Python<'_>, path: PathBuf) -> PyResult<Mesh> {
             MeshFile::Polyhedra(cells) => Box::new(CellsBody::new(cells, None, Dimension::space())),
         })
     })?;
-    Mesh::new(py, body, notes.iter().map(errors::words).collect())
+    Mesh::new(py, body, notes)
 }
 
 /// A frame as "meta" has it.
@@ -1083,9 +930,8 @@ fn sampled<const D: usize>(
 ) -> Result<Vec<f64>, JobError> {
     use atomesh_job::sample::{NamedImage, sample};
     let mut image = in_dimension(image, dimension)?;
-    let bare = Frame::new(image.frame().shape());
     if let Some(frame) = loaded.frame().filter(|frame| frame.shape() == image.frame().shape())
-        && bare.as_ref() == Ok(image.frame())
+        && is_bare(image.frame())
     {
         image = image.with_frame(*frame).map_err(JobError::content)?;
     }

@@ -174,9 +174,7 @@ impl Wishes {
         {
             return None;
         }
-        let table = json!({ "features": { "features": "labels" } });
-        let features: RunConfig = serde_json::from_value(table).expect("it is an option");
-        self.run = std::mem::take(&mut self.run).or(features);
+        self.run.follow_labels();
         labels.map(|labels| (labels.image.clone(), labels.units.clone()))
     }
 

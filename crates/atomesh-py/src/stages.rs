@@ -1,30 +1,26 @@
 //! Stages of a run: a lattice of atoms, its optimisation step by step, and what connects it.
 
-use std::ops::ControlFlow;
-use std::panic::{AssertUnwindSafe, catch_unwind};
-use std::sync::mpsc::{Receiver, RecvTimeoutError, SyncSender, sync_channel};
+pub mod steps;
+
 use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
-use std::time::Duration;
 
 use atomesh::image::Image as CoreImage;
 use atomesh::lattice::Lattice as CoreLattice;
 use atomesh::run::{Connected as CoreConnected, Filled, Prepared, RunError, Settled};
-use atomesh::watch::{AtomsView, Phase, Watch};
+use atomesh::watch::Watch;
 use atomesh_io::image::AnyImage;
-use atomesh_job::mesh::{MeshImages, ShownImage, prepare, refusal};
+use atomesh_job::mesh::{MeshImages, prepare, refusal};
 use atomesh_job::options::RunConfig;
 use atomesh_job::{Dimension, JobError, Session};
-use pyo3::exceptions::PyRuntimeError;
 use pyo3::prelude::*;
 use pyo3::types::{PyDict, PyType};
 
-use crate::mesh::{Body, Made, Mesh, Opened, Source, name_fields, placed};
+use crate::mesh::{Body, Made, Mesh};
 use crate::options::{MESH, Wishes};
-use crate::work::{How, own_pool, work};
+use crate::source::{Opened, Shown, Source, name_fields};
+use crate::work::{How, work};
 use crate::{arrays, errors};
-
-/// How often signals are asked for while a step is waited for.
-const TICK: Duration = Duration::from_millis(20);
+use steps::Steps;
 
 /// How far the atoms have come.
 #[derive(Clone)]
@@ -327,9 +323,7 @@ impl Lattice {
             let body = own(&self.body);
             (body.atoms(), body.dimension())
         };
-        numpy::PyArray1::from_vec(py, atoms)
-            .into_any()
-            .call_method1("reshape", ((-1, axes as isize),))
+        arrays::rows(py, atoms, axes)
     }
 
     /// Warnings and what was changed or not met.
@@ -495,8 +489,9 @@ fn made(
         let Opened { image, units, is_potential } = source.open(&mut run, session)?;
         match image {
             AnyImage::Flat(image) => {
-                let (dimension, shown) = (Dimension::plane(), ShownImage { image, units });
-                let images = placed(&mut run, shown, is_potential, fields, &dimension, session)?;
+                let dimension = Dimension::plane();
+                let shown = Shown { image, units, is_potential, fields };
+                let images = shown.placed(&mut run, &dimension, session)?;
                 let atoms = match atoms {
                     None => None,
                     Some(Own::Flat(atoms)) => Some(atoms),
@@ -505,8 +500,9 @@ fn made(
                 held(run, images, dimension, atoms, session)
             }
             AnyImage::Volume(image) => {
-                let (dimension, shown) = (Dimension::space(), ShownImage { image, units });
-                let images = placed(&mut run, shown, is_potential, fields, &dimension, session)?;
+                let dimension = Dimension::space();
+                let shown = Shown { image, units, is_potential, fields };
+                let images = shown.placed(&mut run, &dimension, session)?;
                 let atoms = match atoms {
                     None => None,
                     Some(Own::Volume(atoms)) => Some(atoms),
@@ -516,7 +512,6 @@ fn made(
             }
         }
     })?;
-    let notes = notes.iter().map(errors::words).collect();
     Ok(Lattice { body: Arc::new(Mutex::new(body)), wishes: Mutex::new(kept), notes })
 }
 
@@ -547,166 +542,6 @@ fn held<const D: usize>(
     Ok(Box::new(Held { parts, state }))
 }
 
-/// Atoms between two iterations of the optimiser.
-///
-/// Attributes: `number` of the step from 1, `energy` of all (without unit), `energy_atomic` and `energy_image`, the parts of
-/// the pairs and of the image.
-#[pyclass(frozen, module = "atomesh")]
-pub struct Step {
-    /// The number of the step, from 1.
-    #[pyo3(get)]
-    number: usize,
-    /// The energy.
-    #[pyo3(get)]
-    energy: f64,
-    /// (1 − β) A.
-    #[pyo3(get)]
-    energy_atomic: f64,
-    /// β B.
-    #[pyo3(get)]
-    energy_image: f64,
-    dimension: usize,
-    atoms: Arc<Vec<f64>>,
-}
-
-#[pymethods]
-impl Step {
-    /// World coordinates of the atoms, shape (n, D), float64; read-only.
-    #[getter]
-    fn atoms<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyAny>> {
-        let shape = [self.atoms.len() / self.dimension, self.dimension];
-        Ok(arrays::view(py, &self.atoms, |atoms| atoms, &shape)?.into_any())
-    }
-
-    fn __repr__(&self) -> String {
-        let count = self.atoms.len() / self.dimension;
-        format!("Step({}: energy {:.6}, {count} atoms)", self.number, self.energy)
-    }
-}
-
-/// What the moving atoms say.
-enum Said {
-    Moved { atoms: Vec<f64>, atomic: f64, image: f64 },
-    Done(Result<Box<dyn std::any::Any + Send>, JobError>),
-}
-
-/// Says where the atoms are, and waits until somebody wants to know where they are next.
-struct Teller {
-    to: SyncSender<Said>,
-    wanted: Receiver<()>,
-    is_gone: bool,
-}
-
-impl Watch for Teller {
-    fn step(&mut self, _: Phase, _: f64, _: Option<f64>) -> ControlFlow<()> {
-        if self.is_gone { ControlFlow::Break(()) } else { ControlFlow::Continue(()) }
-    }
-
-    fn atoms(&mut self, _: Phase, view: AtomsView<'_>) {
-        let moved = Said::Moved {
-            atoms: view.coordinates.to_vec(),
-            atomic: view.energy_atomic,
-            image: view.energy_image,
-        };
-        self.is_gone |= self.to.send(moved).is_err() || self.wanted.recv().is_err();
-    }
-}
-
-/// The ends of the channels to atoms that move.
-struct Channels {
-    from: Receiver<Said>,
-    wants: SyncSender<()>,
-    count: usize,
-}
-
-/// Steps of `Lattice.optimize`, one after another.
-#[pyclass(frozen, module = "atomesh")]
-pub struct Steps {
-    body: Shared,
-    channels: Mutex<Option<Channels>>,
-}
-
-impl Steps {
-    /// Starts moving atoms; they wait for the first step to be asked for.
-    fn start(
-        py: Python<'_>,
-        body: Shared,
-        moving: Box<dyn Moving>,
-        threads: Option<usize>,
-    ) -> PyResult<Self> {
-        let (to, from) = sync_channel(1);
-        let (wants, wanted) = sync_channel(1);
-        // threads of its own: those of others would be blocked while nobody asks
-        let pool = own_pool(py, threads.unwrap_or(0))?;
-        let work = move || {
-            if wanted.recv().is_err() {
-                return;
-            }
-            let mut teller = Teller { to: to.clone(), wanted, is_gone: false };
-            let done = catch_unwind(AssertUnwindSafe(|| pool.install(|| moving.run(&mut teller))));
-            let _ = to.send(Said::Done(done.unwrap_or_else(|_| Err(bug()))));
-        };
-        let named = std::thread::Builder::new().name("atomesh-steps".into());
-        named.spawn(work).map_err(|e| PyRuntimeError::new_err(format!("no thread: {e}")))?;
-        Ok(Self { body, channels: Mutex::new(Some(Channels { from, wants, count: 0 })) })
-    }
-}
-
-fn bug() -> JobError {
-    JobError::content("a panic; this is a bug in atomesh; please report it")
-}
-
-#[pymethods]
-impl Steps {
-    fn __iter__(slf: Py<Self>) -> Py<Self> {
-        slf
-    }
-
-    fn __next__(&self, py: Python<'_>) -> PyResult<Option<Step>> {
-        let taken = self.channels.lock().unwrap_or_else(PoisonError::into_inner).take();
-        let Some(mut channels) = taken else { return Ok(None) };
-        let _ = channels.wants.send(());
-        let channels_of = Mutex::new(channels.from);
-        let said = loop {
-            let heard = py.detach(|| {
-                channels_of.lock().unwrap_or_else(PoisonError::into_inner).recv_timeout(TICK)
-            });
-            match heard {
-                Ok(said) => break said,
-                // without its channels the work ends at its next step
-                Err(RecvTimeoutError::Timeout) => py.check_signals()?,
-                Err(RecvTimeoutError::Disconnected) => break Said::Done(Err(bug())),
-            }
-        };
-        channels.from = channels_of.into_inner().unwrap_or_else(PoisonError::into_inner);
-        match said {
-            Said::Done(done) => {
-                let settled = done.map_err(|error| errors::raise(py, &error))?;
-                own(&self.body).settle(settled);
-                Ok(None)
-            }
-            Said::Moved { atoms, atomic, image } => {
-                let (world, dimension) = {
-                    let mut body = own(&self.body);
-                    body.put(&atoms).map_err(|error| errors::raise(py, &error))?;
-                    (body.in_world(&atoms), body.dimension())
-                };
-                channels.count += 1;
-                let step = Step {
-                    number: channels.count,
-                    energy: atomic + image,
-                    energy_atomic: atomic,
-                    energy_image: image,
-                    dimension,
-                    atoms: Arc::new(world),
-                };
-                *self.channels.lock().unwrap_or_else(PoisonError::into_inner) = Some(channels);
-                Ok(Some(step))
-            }
-        }
-    }
-}
-
 /// Atoms connected by Delaunay's rule, before facets are turned onto features. `Lattice.connect` gives it.
 #[pyclass(frozen, module = "atomesh")]
 pub struct Connected {
@@ -718,17 +553,13 @@ impl Connected {
     /// The points, shape (n, D), float64, world coordinates.
     #[getter]
     fn points<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyAny>> {
-        let (points, axes) = (self.body.points(), self.body.dimension());
-        let points = numpy::PyArray1::from_vec(py, points).into_any();
-        points.call_method1("reshape", ((-1, axes as isize),))
+        arrays::rows(py, self.body.points(), self.body.dimension())
     }
 
     /// The numbers of the points of each cell, shape (m, D + 1), uint32.
     #[getter]
     fn cells<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyAny>> {
-        let (corners, axes) = (self.body.corners(), self.body.dimension());
-        let corners = numpy::PyArray1::from_vec(py, corners).into_any();
-        corners.call_method1("reshape", ((-1, axes as isize + 1),))
+        arrays::rows(py, self.body.corners(), self.body.dimension() + 1)
     }
 
     /// Turns facets onto features and mends badly shaped cells; of Voronoi cells: divides the box among the atoms.
@@ -740,7 +571,7 @@ impl Connected {
         let body = Arc::clone(&self.body);
         let job = move |session: &mut Session<'_>| body.improve(session);
         let (body, notes) = work(py, &How::default(), job)?;
-        Mesh::new(py, body, notes.iter().map(errors::words).collect())
+        Mesh::new(py, body, notes)
     }
 
     fn __repr__(&self) -> String {

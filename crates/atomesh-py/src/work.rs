@@ -21,7 +21,7 @@ use rayon::ThreadPool;
 use crate::errors;
 
 /// How often signals are asked for.
-const TICK: Duration = Duration::from_millis(20);
+pub const TICK: Duration = Duration::from_millis(20);
 
 /// How long the caller waits for a job that was told to stop.
 const PATIENCE: Duration = Duration::from_millis(100);
@@ -132,11 +132,11 @@ impl<T: Send> Watch for Ear<T> {
     }
 }
 
-/// Does a job and gives what it gave, with its notes; says these as warnings.
+/// Does a job and gives what it gave, with its notes in words; says these as warnings.
 ///
 /// # Errors
 /// The exception for the job's refusal, of a callback, or of a signal's handler.
-pub fn work<T, J>(py: Python<'_>, how: &How, job: J) -> PyResult<(T, Vec<Note>)>
+pub fn work<T, J>(py: Python<'_>, how: &How, job: J) -> PyResult<(T, Vec<String>)>
 where
     T: Send + 'static,
     J: FnOnce(&mut Session<'_>) -> Result<T, JobError> + Send + 'static,
@@ -164,7 +164,7 @@ where
     let (done, notes) = listened?;
     let done = done.map_err(|error| errors::raise(py, &error))?;
     errors::warn(py, &notes)?;
-    Ok((done, notes))
+    Ok((done, notes.iter().map(errors::words).collect()))
 }
 
 /// Waits for a job.

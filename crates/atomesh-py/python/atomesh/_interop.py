@@ -47,7 +47,7 @@ def image_of(obj: Any) -> Image:
     if hasattr(obj, "__array__") or hasattr(obj, "__array_interface__") or isinstance(obj, (list, tuple, memoryview)):
         return Image(obj)
     raise TypeError(
-        f"{type(obj).__module__}.{type(obj).__qualname__} is no image that is known; expected an array, atomesh.Image, a path, "
+        f"{type(obj).__module__}.{type(obj).__qualname__} is not an image of a known kind; expected an array, atomesh.Image, a path, "
         "or an image of SimpleITK, ITK, nibabel, pyvista or xarray"
     )
 
@@ -95,7 +95,7 @@ def _of_nibabel(image: Any) -> Image:
     affine = np.asarray(image.affine, float)
     spacing = np.linalg.norm(affine[:3, :3], axis=0)
     if not (np.isfinite(affine).all() and (spacing > 0).all()):
-        raise InputError("an image whose affine is no placement")
+        raise InputError("an image whose affine does not place its samples")
     direction = affine[:3, :3] / spacing
     if np.abs(direction.T @ direction - np.eye(3)).max() > 1e-4:
         raise InputError("an image whose affine is sheared; expected axes at right angles: resample it first")
@@ -361,7 +361,7 @@ def mesh_parts(obj: Any) -> Parts:
     if isinstance(obj, (tuple, list)) and len(obj) == 2:
         return _parts(np.asarray(obj[0]), np.asarray(obj[1]))
     raise TypeError(
-        f"{type(obj).__module__}.{type(obj).__qualname__} is no mesh that is known; expected a pyvista.UnstructuredGrid, a "
+        f"{type(obj).__module__}.{type(obj).__qualname__} is not a mesh of a known kind; expected a pyvista.UnstructuredGrid, a "
         "meshio.Mesh, a mesh of scikit-fem, or a pair (points, cells)"
     )
 

@@ -1,0 +1,120 @@
+//! What a mesh is made from: an image from a file or in memory, and images in memory beside it.
+
+use atomesh::image::Image as CoreImage;
+use atomesh_io::image::{AnyImage, LoadedImage};
+use atomesh_job::mesh::{MeshImages, ShownImage, read_shown};
+use atomesh_job::options::RunConfig;
+use atomesh_job::{Dimension, JobError, Session};
+use pyo3::exceptions::PyTypeError;
+use pyo3::prelude::*;
+
+use crate::image::{Image, is_path};
+use crate::options::{Field, Wishes};
+
+/// What a mesh is made from.
+pub enum Source {
+    /// A file, read with the options of the run.
+    File,
+    /// An image in memory.
+    Given(AnyImage, Vec<String>),
+    /// A potential in memory, and no image.
+    Potential(AnyImage, Vec<String>),
+}
+
+impl Source {
+    /// Takes the first argument of functions that mesh.
+    pub fn take(image: &Bound<'_, PyAny>, wishes: &mut Wishes) -> PyResult<Self> {
+        if image.is_none() {
+            let at = wishes.fields.iter().position(Field::is_potential);
+            return match at {
+                Some(at) => {
+                    let (image, units) = wishes.fields.remove(at).into_image();
+                    Ok(Self::Potential(image, units))
+                }
+                None => match wishes.labels_alone() {
+                    Some((image, units)) => Ok(Self::Given(image, units)),
+                    None if wishes.run.input.shown().is_some() => Ok(Self::File),
+                    None => {
+                        let message = "no image; expected one, or potential= or labels=";
+                        Err(PyTypeError::new_err(message))
+                    }
+                },
+            };
+        }
+        if is_path(image) {
+            wishes.run.input.image = Some(image.extract()?);
+            return Ok(Self::File);
+        }
+        let image = Image::like(image)?;
+        Ok(Self::Given(image.get().any().clone(), image.get().units().to_vec()))
+    }
+
+    /// The images that a mesh is made from.
+    ///
+    /// # Errors
+    /// [`JobError`] if a file cannot be used, or an image is of no use.
+    pub fn open(self, run: &mut RunConfig, session: &mut Session<'_>) -> Result<Opened, JobError> {
+        let (image, units, is_potential) = match self {
+            Self::File => {
+                let LoadedImage { image, units, .. } = read_shown(run, session)?;
+                (image, units, false)
+            }
+            Self::Given(image, units) => (image, units, false),
+            Self::Potential(image, units) => (image, units, true),
+        };
+        Ok(Opened { image, units, is_potential })
+    }
+}
+
+/// The image that gives the frame.
+pub struct Opened {
+    pub image: AnyImage,
+    pub units: Vec<String>,
+    pub is_potential: bool,
+}
+
+/// The image that gives the frame, of a known dimension, with images in memory beside it.
+pub struct Shown<const D: usize> {
+    pub image: CoreImage<D>,
+    pub units: Vec<String>,
+    pub is_potential: bool,
+    pub fields: Vec<Field>,
+}
+
+impl<const D: usize> Shown<D> {
+    /// The images of a run, placed.
+    ///
+    /// # Errors
+    /// [`JobError`] if an image is of no use.
+    pub fn placed(
+        self,
+        run: &mut RunConfig,
+        dimension: &Dimension<D>,
+        session: &mut Session<'_>,
+    ) -> Result<MeshImages<D>, JobError> {
+        let Self { image, units, is_potential, fields } = self;
+        let given = Wishes::given(fields, dimension)?;
+        let shown = ShownImage { image, units };
+        let mut images = MeshImages::with_fields(run, shown, given, dimension, session)?;
+        images.is_potential |= is_potential;
+        name_fields(run, &images);
+        Ok(images)
+    }
+}
+
+/// Names images in memory as files would be: options that they replace have no part in the run then.
+pub fn name_fields<const D: usize>(run: &mut RunConfig, images: &MeshImages<D>) {
+    let MeshImages { is_potential, potential, size_field, weight_field, mask, labels, .. } = images;
+    let input = &mut run.input;
+    for (path, is_there, name) in [
+        (&mut input.potential, *is_potential || potential.is_some(), "potential"),
+        (&mut input.size_field, size_field.is_some(), "size_field"),
+        (&mut input.beta_field, weight_field.is_some(), "beta_field"),
+        (&mut input.mask, mask.is_some(), "mask"),
+        (&mut input.labels, labels.is_some(), "labels"),
+    ] {
+        if is_there && path.is_none() {
+            *path = Some(name.into());
+        }
+    }
+}
