@@ -23,6 +23,7 @@ pub struct JobError {
     file: Option<PathBuf>,
     message: String,
     advice: Option<String>,
+    os_code: Option<i32>,
 }
 
 /// What a shell tells apart: exit codes, exceptions.
@@ -45,7 +46,7 @@ pub enum ErrorKind {
 
 impl JobError {
     fn new(kind: ErrorKind, message: impl fmt::Display) -> Self {
-        Self { kind, file: None, message: message.to_string(), advice: None }
+        Self { kind, file: None, message: message.to_string(), advice: None, os_code: None }
     }
 
     /// Options that are out of range or contradict each other.
@@ -63,13 +64,24 @@ impl JobError {
         Self::new(ErrorKind::File, message)
     }
 
+    /// A file that the system does not let be read.
+    pub fn unreadable(error: &io::Error) -> Self {
+        Self::file(format!("cannot be read: {error}")).by_system(error)
+    }
+
+    /// The same, with the system's number for what it refused.
+    pub(crate) fn by_system(mut self, error: &io::Error) -> Self {
+        self.os_code = error.raw_os_error();
+        self
+    }
+
     /// A file that the system does not let be written, with what might help.
     pub fn unwritable(error: &io::Error) -> Self {
         use io::ErrorKind::{
             BrokenPipe, FileTooLarge, InvalidFilename, NotFound, PermissionDenied, QuotaExceeded,
             ReadOnlyFilesystem, StorageFull,
         };
-        let refusal = Self::file(format!("cannot be written: {error}"));
+        let refusal = Self::file(format!("cannot be written: {error}")).by_system(error);
         match error.kind() {
             BrokenPipe => Self::new(ErrorKind::ClosedPipe, "the reader went away"),
             StorageFull | QuotaExceeded => refusal.advise("make room, or choose another folder"),
@@ -136,6 +148,11 @@ impl JobError {
     /// The file that it is about.
     pub fn path(&self) -> Option<&Path> {
         self.file.as_deref()
+    }
+
+    /// The system's number (errno) for what it refused, if that was the reason.
+    pub fn os_code(&self) -> Option<i32> {
+        self.os_code
     }
 
     /// What the user might do.

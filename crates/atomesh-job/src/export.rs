@@ -175,7 +175,7 @@ impl<const D: usize> Export<'_, D> {
         dimension: &Dimension<D>,
         session: &mut Session<'_>,
     ) -> Result<ExportSummary, JobError> {
-        let LoadedCells { mesh, features, fields, frame, provenance } = self.cells;
+        let LoadedCells { mesh, features, fields, frame, provenance, .. } = self.cells;
         let method = &dimension.flow;
         let grid = (method.grid_of_cells)(mesh, Some(features));
         let barriers = self.request.barrier.iter().map(|spec| spec.barrier().clone()).collect();

@@ -34,7 +34,9 @@ fn refusal(error: ReadError) -> JobError {
     let ReadError { path, reason, .. } = error;
     match reason {
         ReadReason::Cancelled(_) => JobError::cancelled(),
-        ReadReason::Io(_) | ReadReason::DataFile { .. } => JobError::file(&reason),
+        ReadReason::Io(ref error) | ReadReason::DataFile { ref error, .. } => {
+            JobError::file(&reason).by_system(error)
+        }
         ReadReason::UnknownExtension { .. } => JobError::misuse(&reason)
             .advise("rename the file, or describe raw samples by --shape and --dtype"),
         ReadReason::NoRawLayout => JobError::misuse("raw samples say neither shape nor type")

@@ -13,6 +13,7 @@ use atomesh_io::mesh::{AnyMesh, LoadedMesh, MeshFormat, MeshReadError, Provenanc
 use crate::error::JobError;
 use crate::files::has_extension;
 use crate::memory;
+use crate::session::{Note, NoteKind, Session};
 
 /// What a mesh file holds.
 #[derive(Clone, Debug)]
@@ -52,6 +53,23 @@ pub fn read(path: &Path, watch: &mut dyn Watch) -> Result<MeshFile, JobError> {
     }
 }
 
+impl MeshFile {
+    /// Says which fields were not read, where the mesh is to be written again without them.
+    pub(crate) fn note_skipped(&self, path: &Path, session: &mut Session<'_>) {
+        let skipped = match self {
+            Self::Flat(mesh) => &mesh.skipped_fields,
+            Self::Volume(mesh) => &mesh.skipped_fields,
+            Self::Polygons(cells) => &cells.skipped_fields,
+            Self::Polyhedra(cells) => &cells.skipped_fields,
+        };
+        if !skipped.is_empty() {
+            let text =
+                format!("only fields of one number are kept; {} left out", skipped.join(", "));
+            session.note(Note { kind: NoteKind::Change, file: Some(path.to_owned()), text });
+        }
+    }
+}
+
 /// Whether a file is a list of connections of Voronoi cells by its name.
 pub fn is_list(path: &Path) -> bool {
     has_extension(path, "json")
@@ -70,7 +88,7 @@ fn mesh_refusal(error: MeshReadError, path: &Path) -> JobError {
             let known = MeshFormat::endings();
             JobError::misuse(format!("unknown extension of a mesh file; expected one of {known}"))
         }
-        MeshReadError::Io(e) => JobError::file(format!("cannot be read: {e}")),
+        MeshReadError::Io(e) => JobError::unreadable(&e),
         _ => JobError::content(error),
     }
     .about(path)
@@ -81,7 +99,7 @@ pub(crate) fn cells_refusal(error: CellReadError, path: &Path) -> JobError {
     match error {
         CellReadError::Cancelled(_) => JobError::cancelled(),
         CellReadError::Format => JobError::misuse(error),
-        CellReadError::Io { error, .. } => JobError::file(format!("cannot be read: {error}")),
+        CellReadError::Io { error, .. } => JobError::unreadable(&error),
         CellReadError::Mesh(_) | CellReadError::NotVoronoi { .. } => JobError::content(error)
             .advise("`atomesh mesh IMAGE -o CELLS.vtu --mesh voronoi` makes Voronoi cells"),
         _ => JobError::content(error),

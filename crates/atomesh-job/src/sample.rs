@@ -216,7 +216,9 @@ pub fn sample_file(
     let inputs = request.image.iter().map(|image| image.path.as_path());
     let inputs = inputs.chain([request.mesh.as_path()]);
     files::check_apart(inputs, [request.output.as_path()], session)?;
-    match mesh_file::read(&request.mesh, session)? {
+    let file = mesh_file::read(&request.mesh, session)?;
+    file.note_skipped(&request.mesh, session);
+    match file {
         MeshFile::Flat(mesh) => run(request, mesh, &Dimension::plane(), session),
         MeshFile::Volume(mesh) => run(request, mesh, &Dimension::space(), session),
         MeshFile::Polygons(cells) => run(request, cells, &Dimension::plane(), session),

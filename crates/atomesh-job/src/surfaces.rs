@@ -213,7 +213,7 @@ pub fn groups_of_cells<const D: usize>(loaded: &LoadedCells<D>) -> Vec<FacetGrou
 }
 
 /// The features of Voronoi cells, numbered from 1; polygons are cut into triangles from their first points.
-pub(crate) fn feature_groups<const D: usize>(
+pub fn feature_groups<const D: usize>(
     cells: &PolyMesh<D>,
     features: &FeatureFaces,
 ) -> Vec<FacetGroup<D>> {
@@ -291,6 +291,7 @@ mod tests {
             provenance: None,
             tags,
             skipped_cells: 0,
+            skipped_fields: Vec::new(),
         }
     }
 

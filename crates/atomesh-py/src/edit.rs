@@ -71,17 +71,18 @@ struct Held<const D: usize> {
     dimension: Dimension<D>,
 }
 
-/// An editor of the atoms of a mesh that was made, in lattice coordinates.
+/// An editor of the atoms of a mesh that was made, in lattice coordinates, over an image.
 ///
 /// # Errors
 /// [`JobError`] if the mesh ends within the box, or the watch ends the work.
 pub fn editor<const D: usize>(
     made: &Made<D>,
+    image: CoreImage<D>,
     atoms: &[[f64; D]],
     dimension: Dimension<D>,
     session: &mut Session<'_>,
 ) -> Result<Box<dyn EditorBody>, JobError> {
-    let Made { run, outcome, image, units } = made;
+    let Made { run, outcome, units, .. } = made;
     let prepared = outcome.run().clone();
     if prepared.outline().is_some() {
         let message =
@@ -98,7 +99,7 @@ pub fn editor<const D: usize>(
         names,
         prepared,
         run: run.clone(),
-        image: image.clone(),
+        image,
         units: units.clone(),
         dimension,
     }))

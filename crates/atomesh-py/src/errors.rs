@@ -99,7 +99,15 @@ pub fn raise(py: Python<'_>, error: &JobError) -> PyErr {
         Some(advice) => format!("{error}; {advice}"),
         None => error.to_string(),
     };
-    exception(py, name, &in_keywords(&message))
+    let raised = exception(py, name, &in_keywords(&message));
+    if name == "FileError" {
+        // as of Python's own refusals; the message stays ours
+        let value = raised.value(py);
+        let file = error.path().map(|path| path.to_string_lossy().into_owned());
+        let _ = value.setattr("errno", error.os_code());
+        let _ = value.setattr("filename", file);
+    }
+    raised
 }
 
 /// Says notes as warnings: what was changed or guessed as `AtomeshNote`, the rest as `AtomeshWarning`. Remarks are kept

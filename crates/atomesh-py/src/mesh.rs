@@ -3,20 +3,23 @@
 mod body;
 mod cells;
 mod given;
+pub mod images;
+mod meta;
 mod simplices;
+mod written;
 
 use std::collections::BTreeMap;
 use std::path::PathBuf;
 use std::sync::Arc;
 
-use atomesh::image::{Frame, Image as CoreImage};
+use atomesh::image::Image as CoreImage;
 use atomesh::run::Outcome;
 use atomesh_draw::{DrawError, Picture, PictureFormat};
 use atomesh_io::image::AnyImage;
-use atomesh_job::images::is_bare;
+use atomesh_job::features::FeaturesRequest;
 use atomesh_job::mesh::{MadeMesh, MeshImages, prepare};
 use atomesh_job::options::{OutputOptions, RunConfig};
-use atomesh_job::sample::{Property, SampledMesh};
+use atomesh_job::sample::Property;
 use atomesh_job::{Dimension, JobError, Session};
 use pyo3::exceptions::PyKeyError;
 use pyo3::prelude::*;
@@ -128,7 +131,7 @@ impl Mesh {
     }
 
     /// An image for a job beside the mesh.
-    fn image_for(image: Option<&Bound<'_, PyAny>>) -> PyResult<Option<AnyImage>> {
+    pub fn image_for(image: Option<&Bound<'_, PyAny>>) -> PyResult<Option<AnyImage>> {
         let image = image.filter(|given| !given.is_none()).map(Image::like).transpose()?;
         Ok(image.map(|image| image.get().any().clone()))
     }
@@ -367,8 +370,8 @@ impl Mesh {
     ///     The image whose features they follow. Default: the mesh's own features, else its values "potential".
     /// below : float, optional
     ///     Choose all facets along which the mean of b is at most this, -1 to 1, in place of the mesh's own features.
-    /// min_facets : int
-    ///     Pieces of fewer facets are dropped. Default 3.
+    /// min_facets : int, optional
+    ///     Pieces of fewer facets are dropped. Default 3; of the mesh's own features none is dropped.
     /// min_measure : float
     ///     Pieces of less length or area, in world units, are dropped. Default 0.
     /// close_gaps : bool
@@ -387,14 +390,14 @@ impl Mesh {
     /// >>> img = np.full((60, 80), 200, np.uint8); img[30, :] = 10
     /// >>> [s.name for s in am.mesh(img, size=8).features()]
     /// ['feature-1']
-    #[pyo3(signature = (image = None, *, below = None, min_facets = 3, min_measure = 0.0, close_gaps = false, **options))]
+    #[pyo3(signature = (image = None, *, below = None, min_facets = None, min_measure = 0.0, close_gaps = false, **options))]
     #[allow(clippy::too_many_arguments)] // keywords
     fn features<'py>(
         &self,
         py: Python<'py>,
         image: Option<&Bound<'py, PyAny>>,
         below: Option<f64>,
-        min_facets: usize,
+        min_facets: Option<usize>,
         min_measure: f64,
         close_gaps: bool,
         options: Option<&Bound<'py, PyDict>>,
@@ -402,7 +405,7 @@ impl Mesh {
         let Wishes { run, how, .. } = Wishes::take("features", options, &["features", "frame"])?;
         let image = Self::image_for(image)?;
         let shared = Arc::clone(&self.shared);
-        let request = atomesh_job::features::FeaturesRequest {
+        let request = FeaturesRequest {
             below,
             min_facets,
             min_measure,
@@ -664,12 +667,20 @@ impl Mesh {
     ///
     /// A mesh that was read cannot be edited: it does not know its image and options.
     ///
+    /// Parameters
+    /// ----------
+    /// image : Image or array, optional
+    ///     What the edited mesh is shown over and compared with, in the same place as the mesh's own image. Default: that.
+    ///
     /// Returns
     /// -------
     /// Editor
-    fn edit(&self, py: Python<'_>) -> PyResult<Editor> {
+    #[pyo3(signature = (image = None))]
+    fn edit(&self, py: Python<'_>, image: Option<&Bound<'_, PyAny>>) -> PyResult<Editor> {
+        let image = Self::image_for(image)?;
         let shared = Arc::clone(&self.shared);
-        let (editor, _) = work(py, &Default::default(), move |session| shared.0.editor(session))?;
+        let job = move |session: &mut Session<'_>| shared.0.editor(image, session);
+        let (editor, _) = work(py, &Default::default(), job)?;
         Ok(Editor::new(editor))
     }
 
@@ -825,117 +836,13 @@ pub fn read_mesh(py: Python<'_>, path: PathBuf) -> PyResult<Mesh> {
     Mesh::new(py, body, notes)
 }
 
-/// A frame as "meta" has it.
-fn frame_json<const D: usize>(frame: &Frame<D>) -> serde_json::Value {
-    let rows: Vec<Vec<f64>> = frame.direction().iter().map(|row| row.to_vec()).collect();
-    serde_json::json!({
-        "shape": frame.shape().to_vec(),
-        "spacing": frame.spacing().to_vec(),
-        "origin": frame.origin().to_vec(),
-        "direction": rows,
-    })
-}
-
-/// Where a mesh comes from, as `meta` has it.
-fn meta<const D: usize>(
-    frame: Option<&Frame<D>>,
-    provenance: Option<&atomesh_io::mesh::Provenance>,
-) -> serde_json::Value {
-    let mut all = serde_json::Map::new();
-    if let Some(frame) = frame {
-        all.insert("frame".into(), frame_json(frame));
-    }
-    if let Some(made) = provenance {
-        all.insert("version".into(), made.version.clone().into());
-        all.insert("options".into(), made.options.clone());
-        all.insert("seed".into(), made.seed.into());
-        all.insert("units".into(), made.units.clone().into());
-    }
-    all.into()
-}
-
-/// The image if it has the mesh's number of axes.
-fn in_dimension<const D: usize>(
-    image: AnyImage,
-    dimension: &Dimension<D>,
-) -> Result<CoreImage<D>, JobError> {
-    let axes = image.dimension();
-    (dimension.image)(image).ok_or_else(|| {
-        JobError::content(format!("the image has {axes} axes; expected {D}, as the mesh"))
-    })
-}
-
 /// The refusal to edit a mesh that was read.
 fn not_made() -> JobError {
     JobError::misuse("a mesh that was read cannot be edited; expected one that mesh() made")
-}
-
-/// The refusal of what needs the image of a mesh that was read.
-fn of_file(what: &str) -> JobError {
-    JobError::misuse(format!("{what}() of a mesh that was read; expected the image too"))
-}
-
-/// The image that a picture of a mesh is drawn on: one that is given, or its own.
-fn backdrop<'a, const D: usize>(
-    given: Option<&'a CoreImage<D>>,
-    made: Option<&'a Made<D>>,
-) -> Result<&'a CoreImage<D>, JobError> {
-    given.or(made.map(|made| &made.image)).ok_or_else(|| of_file("picture"))
 }
 
 /// A picture as a PNG.
 fn png(picture: Result<Picture, DrawError>) -> Result<Vec<u8>, JobError> {
     let png = picture.and_then(|picture| picture.encode(PictureFormat::Png));
     png.map_err(JobError::content)
-}
-
-/// Writes a mesh: one that was made with all that the options name, one that was read alone.
-fn written<const D: usize>(
-    made: Option<&Made<D>>,
-    loaded: &impl SampledMesh<D>,
-    output: OutputOptions,
-    properties: &[Property],
-    dimension: &Dimension<D>,
-    session: &mut Session<'_>,
-) -> Result<(), JobError> {
-    if let Some(made) = made {
-        let run = RunConfig { output, ..made.run.clone() };
-        return made.as_job(&run, properties).write(dimension, session).map(drop);
-    }
-    let path = output_alone(output)?;
-    loaded.check_output(&path)?;
-    session.write_together(|group, session| {
-        let staged = atomesh_job::files::stage(&path, group)?;
-        loaded.write(&staged, properties, dimension, session)
-    })
-}
-
-/// The file of a mesh that was read, where nothing is to be written beside it.
-fn output_alone(output: OutputOptions) -> Result<PathBuf, JobError> {
-    let path = output.output.clone().unwrap_or_default();
-    if output == (OutputOptions { output: Some(path.clone()), ..Default::default() }) {
-        return Ok(path);
-    }
-    Err(JobError::misuse("options of writing are for meshes made from an image; expected none"))
-}
-
-/// One value for each cell from an image, in the place that it says, or else where the mesh's image was.
-fn sampled<const D: usize>(
-    request: &atomesh_job::sample::SampleRequest,
-    name: &str,
-    loaded: &impl SampledMesh<D>,
-    image: AnyImage,
-    dimension: &Dimension<D>,
-    session: &mut Session<'_>,
-) -> Result<Vec<f64>, JobError> {
-    use atomesh_job::sample::{NamedImage, sample};
-    let mut image = in_dimension(image, dimension)?;
-    if let Some(frame) = loaded.frame().filter(|frame| frame.shape() == image.frame().shape())
-        && is_bare(image.frame())
-    {
-        image = image.with_frame(*frame).map_err(JobError::content)?;
-    }
-    let named = NamedImage { name: name.to_owned(), path: name.into() };
-    let mut found = sample(request, &named, loaded, &image, dimension, session)?;
-    Ok(found.swap_remove(0).into_values())
 }

@@ -33,9 +33,9 @@ pub struct Field {
 }
 
 impl Field {
-    /// Whether it is b(x).
-    pub fn is_potential(&self) -> bool {
-        self.name == "potential"
+    /// Whether it is given by that keyword.
+    pub fn is_named(&self, name: &str) -> bool {
+        self.name == name
     }
 
     /// The image and its units.

@@ -25,7 +25,7 @@ impl Source {
     /// Takes the first argument of functions that mesh.
     pub fn take(image: &Bound<'_, PyAny>, wishes: &mut Wishes) -> PyResult<Self> {
         if image.is_none() {
-            let at = wishes.fields.iter().position(Field::is_potential);
+            let at = wishes.fields.iter().position(|field| field.is_named("potential"));
             return match at {
                 Some(at) => {
                     let (image, units) = wishes.fields.remove(at).into_image();
@@ -42,7 +42,15 @@ impl Source {
             };
         }
         if is_path(image) {
-            wishes.run.input.image = Some(image.extract()?);
+            let input = &mut wishes.run.input;
+            input.image = Some(image.extract()?);
+            // whether its samples are read as labels depends on what is beside it
+            for (name, path) in [("labels", &mut input.labels), ("potential", &mut input.potential)]
+            {
+                if wishes.fields.iter().any(|field| field.is_named(name)) {
+                    path.get_or_insert_with(|| name.into());
+                }
+            }
             return Ok(Self::File);
         }
         let image = Image::like(image)?;

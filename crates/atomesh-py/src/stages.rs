@@ -12,9 +12,11 @@ use atomesh_io::image::AnyImage;
 use atomesh_job::mesh::{MeshImages, prepare, refusal};
 use atomesh_job::options::RunConfig;
 use atomesh_job::{Dimension, JobError, Session};
+use pyo3::exceptions::PyTypeError;
 use pyo3::prelude::*;
 use pyo3::types::{PyDict, PyType};
 
+use crate::mesh::images::over;
 use crate::mesh::{Body, Made, Mesh};
 use crate::options::{MESH, Wishes};
 use crate::source::{Opened, Shown, Source, name_fields};
@@ -83,7 +85,11 @@ trait ConnectedBody: Send + Sync {
     ///
     /// # Errors
     /// [`JobError`] if the watch ends the work.
-    fn improve(&self, session: &mut Session<'_>) -> Result<Box<dyn Body>, JobError>;
+    fn improve(
+        &self,
+        image: Option<AnyImage>,
+        session: &mut Session<'_>,
+    ) -> Result<Box<dyn Body>, JobError>;
 }
 
 /// What a lattice is made in.
@@ -227,15 +233,20 @@ impl<const D: usize> ConnectedBody for Joined<D> {
         D
     }
 
-    fn improve(&self, session: &mut Session<'_>) -> Result<Box<dyn Body>, JobError> {
-        let Parts { run, image, images, dimension, .. } = &self.parts;
+    fn improve(
+        &self,
+        image: Option<AnyImage>,
+        session: &mut Session<'_>,
+    ) -> Result<Box<dyn Body>, JobError> {
+        let Parts { run, image: own, images, dimension, .. } = &self.parts;
+        let image = over(image, own, dimension)?;
         let outcome = (|| match run.is_voronoi() {
             true => self.settled.clone().divide(session)?.finish(session),
             false => self.connected.clone().improve(session)?.finish(session),
         })();
         let outcome = outcome.map_err(|e| refusal(run, e))?;
         let units = images.units.clone();
-        Made { run: run.clone(), outcome, image: image.clone(), units }.into_body(dimension.clone())
+        Made { run: run.clone(), outcome, image, units }.into_body(dimension.clone())
     }
 }
 
@@ -288,7 +299,8 @@ impl Lattice {
     /// image : Image, array or path-like
     ///     The image.
     /// **options
-    ///     As of `mesh`.
+    ///     As of `mesh`. `size` is the distance at which atoms neither attract nor repel each other: give it as the points
+    ///     have it; its default is for the image, whatever the points are.
     ///
     /// Returns
     /// -------
@@ -344,7 +356,7 @@ impl Lattice {
     /// beta : float or image, optional
     ///     Weight of the image against regularity, 0 to 1.
     /// **options
-    ///     As of `mesh`: `engine`, `tolerance` ...
+    ///     As of `mesh`: `engine`, `tolerance`, `strict` ... There is no `progress`: the loop sees each step.
     ///
     /// Returns
     /// -------
@@ -353,8 +365,13 @@ impl Lattice {
     fn optimize(&self, py: Python<'_>, options: Option<&Bound<'_, PyDict>>) -> PyResult<Steps> {
         let wishes = self.wishes(options)?;
         let body = Arc::clone(&self.body);
-        let threads = wishes.as_ref().and_then(|wishes| wishes.how.threads);
-        let how = How { threads, ..How::default() };
+        let (threads, strict) =
+            wishes.as_ref().map_or((None, false), |all| (all.how.threads, all.how.strict));
+        if wishes.as_ref().is_some_and(|all| all.how.progress.is_some()) {
+            let message = "optimize() has no progress: the loop sees each step; settle() has it";
+            return Err(PyTypeError::new_err(message));
+        }
+        let how = How { threads, strict, progress: None };
         let job = move |session: &mut Session<'_>| restart(&body, wishes, session);
         let (moving, _) = work(py, &how, job)?;
         Steps::start(py, Arc::clone(&self.body), moving, threads)
@@ -390,6 +407,9 @@ impl Lattice {
     }
 
     /// Connects the atoms by Delaunay's rule, where they are now.
+    ///
+    /// Where `align` is "conform", which is the default where there are features, some atoms are added on features so that
+    /// facets follow them without a gap; with `align="swaps"` or "off" the points are the atoms.
     ///
     /// Returns
     /// -------
@@ -564,12 +584,19 @@ impl Connected {
 
     /// Turns facets onto features and mends badly shaped cells; of Voronoi cells: divides the box among the atoms.
     ///
+    /// Parameters
+    /// ----------
+    /// image : Image or array, optional
+    ///     What the mesh is shown over and compared with, in the same place as the lattice's own image. Default: that.
+    ///
     /// Returns
     /// -------
     /// Mesh
-    fn improve(&self, py: Python<'_>) -> PyResult<Mesh> {
+    #[pyo3(signature = (image = None))]
+    fn improve(&self, py: Python<'_>, image: Option<&Bound<'_, PyAny>>) -> PyResult<Mesh> {
+        let image = Mesh::image_for(image)?;
         let body = Arc::clone(&self.body);
-        let job = move |session: &mut Session<'_>| body.improve(session);
+        let job = move |session: &mut Session<'_>| body.improve(image, session);
         let (body, notes) = work(py, &How::default(), job)?;
         Mesh::new(py, body, notes)
     }

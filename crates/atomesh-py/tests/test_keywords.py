@@ -1,5 +1,6 @@
 """Keywords: unknown ones, renamed ones, values out of range; errors and warnings."""
 
+import errno
 import subprocess
 import sys
 import warnings
@@ -88,8 +89,10 @@ def test_errors_are_what_python_has_too(tmp_path: Path) -> None:
         (am.InputError, ValueError), (am.FileError, OSError), (am.MemoryForecastError, MemoryError), (am.Cancelled, Exception),
     ]:
         assert issubclass(error, am.Error) and issubclass(error, base) and error.__module__ == "atomesh"
-    with pytest.raises(am.FileError, match="missing.npy"):
+    with pytest.raises(am.FileError, match="missing.npy: cannot be read") as caught:
         am.read(tmp_path / "missing.npy")
+    assert caught.value.errno == errno.ENOENT and caught.value.filename == str(tmp_path / "missing.npy")
+    assert str(caught.value).startswith(str(tmp_path))
     with pytest.raises(am.FileError, match="missing.npy"):
         am.mesh(tmp_path / "missing.npy")
     with pytest.raises(am.FileError):
@@ -99,8 +102,9 @@ def test_errors_are_what_python_has_too(tmp_path: Path) -> None:
         am.read(tmp_path / "broken.npy")
     with pytest.raises(am.MemoryForecastError):
         am.mesh(np.zeros((600, 600, 600), np.uint8), size=1)
-    with pytest.raises(am.FileError):
+    with pytest.raises(am.FileError) as caught:
         am.mesh(FLAT, size=8).write(tmp_path / "no folder" / "m.vtu")
+    assert caught.value.errno == errno.ENOENT
     with pytest.raises(am.InputError, match="extension|format"):
         am.mesh(FLAT, size=8).write(tmp_path / "m.nonsense")
     assert [path.name for path in tmp_path.iterdir()] == ["broken.npy"]

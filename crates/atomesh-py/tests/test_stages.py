@@ -260,6 +260,12 @@ def test_surfaces_have_the_points_that_they_need(in_tmp: Path) -> None:
     assert found and found[0].name == "feature-1" and found[0].info is not None and found[0].info["measure"] > 0
     flat = am.mesh(FLAT, size=7)
     assert flat.features(below=-0.3) and not flat.features(below=-0.3, min_facets=10**6)
+    own = flat.features()
+    longest = own[0].info["measure"]
+    assert [s.name for s in flat.features(min_measure=longest)] == ["feature-1"] and not flat.features(min_facets=10**6)
+    assert all(-1 <= s.info["mean"] < 0 for s in own)  # of the values at the points
+    with pytest.raises(am.InputError, match="close_gaps"):
+        flat.features(close_gaps=True)
     with pytest.raises(am.FileError):
         right.write("no folder/s.vtp")
 
@@ -279,6 +285,42 @@ def test_reports_are_those_of_the_mesh_or_of_an_image(in_tmp: Path) -> None:
     assert read.picture(FLAT)[:4] == b"\x89PNG"
     with pytest.raises(am.InputError, match="image"):
         read.picture()
+
+
+def test_voronoi_cells_that_were_read_are_measured_and_searched_by_an_image(in_tmp: Path) -> None:
+    made = am.mesh(FLAT, size=7, kind="voronoi")
+    made.write("v.vtu")
+    read = am.read_mesh("v.vtu")
+    with pytest.warns(am.AtomeshNote, match="fidelity"):
+        report = read.report(FLAT, size=7)
+    np.testing.assert_allclose(report["alignment"]["recall"], made.report()["alignment"]["recall"], atol=0.05)
+    with pytest.raises(am.InputError, match="image"):
+        read.report()
+    own = read.features()
+    assert [s.name for s in own] == [s.name for s in made.features()]
+    length = np.linalg.norm(np.diff(own[0].points[own[0].cells], axis=1), axis=2).sum()
+    np.testing.assert_allclose(own[0].info["measure"], length, rtol=1e-9)
+    anew = read.features(FLAT, below=-0.3)
+    np.testing.assert_allclose(anew[0].info["measure"], length, rtol=0.1)
+    with pytest.raises(am.InputError, match="below"):
+        read.features(FLAT)
+
+
+def test_pictures_of_later_stages_may_be_over_another_image_in_the_same_place() -> None:
+    lat = am.lattice(FLAT, distance=7)
+    lat.settle()
+    connected = lat.connect()
+    own, inverted = connected.improve(), connected.improve(255 - FLAT)
+    np.testing.assert_array_equal(own.points, inverted.points)
+    assert own.picture() != inverted.picture()
+    assert own.edit(255 - FLAT).mesh().picture() == inverted.edit().mesh().picture()
+    with pytest.raises(am.InputError, match="samples"):
+        connected.improve(FLAT[1:])
+
+
+def test_the_loop_is_the_progress_of_steps() -> None:
+    with pytest.raises(TypeError, match="settle"):
+        am.lattice(FLAT, distance=7).optimize(progress=print)
 
 
 def test_flow_is_conserved_in_each_cell_and_exact_where_pressure_is_linear() -> None:

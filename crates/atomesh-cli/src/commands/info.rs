@@ -121,6 +121,12 @@ fn frame_text<const D: usize>(frame: &Frame<D>) -> String {
     text
 }
 
+fn left_out_text(text: &mut String, fields: &[String]) {
+    if !fields.is_empty() {
+        line(text, "left out", format_args!("fields {}", fields.join(", ")));
+    }
+}
+
 fn mesh_text<const D: usize>(
     loaded: &LoadedMesh<D>,
     dimension: &Dimension<D>,
@@ -133,6 +139,7 @@ fn mesh_text<const D: usize>(
     if loaded.skipped_cells > 0 {
         line(&mut text, "left out", format_args!("{} other cells", loaded.skipped_cells));
     }
+    left_out_text(&mut text, &loaded.skipped_fields);
     if let Some(Bounds { min, max }) = Bounds::of(mesh.points()) {
         line(&mut text, "box", box_text(min, max));
     }
@@ -153,10 +160,11 @@ fn mesh_text<const D: usize>(
 }
 
 fn cells_text<const D: usize>(cells: &LoadedCells<D>, dimension: &Dimension<D>) -> String {
-    let LoadedCells { mesh, features, fields, frame, provenance } = cells;
+    let LoadedCells { mesh, features, fields, skipped_fields, frame, provenance } = cells;
     let mut text = String::new();
     line(&mut text, "points", mesh.points().len());
     line(&mut text, dimension.voronoi_cells, mesh.cell_count());
+    left_out_text(&mut text, skipped_fields);
     if let Some(bounds) = Bounds::of(mesh.points()) {
         line(&mut text, "box", box_text(bounds.min, bounds.max));
         cells_quality_text(&mut text, &(dimension.tools.cells_shape)(mesh, &bounds));

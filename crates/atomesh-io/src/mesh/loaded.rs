@@ -11,7 +11,7 @@ use super::provenance::Provenance;
 pub struct LoadedMesh<const D: usize> {
     /// The mesh, in world coordinates, with cells in the file's order and orientation.
     pub mesh: Mesh<D>,
-    /// The scalar fields at the points, in the file's order; other fields are left out.
+    /// The scalar fields at the points, in the file's order.
     pub point_fields: Vec<OwnedField>,
     /// The groups of facets and cells, as far as the format holds them and they are the mesh's.
     pub tags: Tags<D>,
@@ -24,6 +24,8 @@ pub struct LoadedMesh<const D: usize> {
     pub provenance: Option<Provenance>,
     /// The number of cells left out: points, lines, surface triangles of a volume mesh, quadrilaterals ...
     pub skipped_cells: usize,
+    /// The names of fields left out: vectors and tensors, values that are no numbers or not one for each point or cell.
+    pub skipped_fields: Vec<String>,
 }
 
 impl<const D: usize> LoadedMesh<D> {

@@ -15,6 +15,8 @@ pub(super) struct Parts {
     pub triangles: Vec<u32>,
     pub tetrahedra: Vec<u32>,
     pub skipped_cells: usize,
+    /// The names of fields that are no scalars, or not whole.
+    pub skipped_fields: Vec<String>,
     /// The corners of each cell of the file that is kept, 0 for the others, in the file's order.
     pub cell_kinds: Vec<u8>,
     pub fields: Vec<OwnedField>,
@@ -39,6 +41,13 @@ impl Parts {
         self.cell_kinds.push(4);
     }
 
+    /// Leaves a field out.
+    pub fn skip_field(&mut self, name: &str) {
+        if !name.is_empty() && !self.skipped_fields.iter().any(|known| known == name) {
+            self.skipped_fields.push(name.to_owned());
+        }
+    }
+
     /// Leaves a cell out.
     pub fn skip_cell(&mut self) {
         self.skipped_cells += 1;
@@ -51,6 +60,9 @@ impl Parts {
         let mut fields = std::mem::take(&mut self.cell_fields);
         fields.retain_mut(|field| {
             let whole = field.values.len() == kinds.len();
+            if !whole {
+                self.skipped_fields.push(field.name.clone());
+            }
             let mut kinds = kinds.iter();
             field.values.retain(|_| kinds.next() == Some(&corners));
             whole
@@ -117,7 +129,9 @@ impl Parts {
             let (tags, left_out) = self.tags.into_tags(&mesh, facets, regions)?;
             let skipped = self.skipped_cells + untagged + left_out;
             let loaded = loaded(mesh, self.fields, &self.metadata, skipped);
-            return Ok(AnyMesh::Volume(LoadedMesh { tags, cell_fields, ..loaded }));
+            let skipped_fields = self.skipped_fields;
+            let loaded = LoadedMesh { tags, cell_fields, skipped_fields, ..loaded };
+            return Ok(AnyMesh::Volume(loaded));
         }
         if self.triangles.is_empty() {
             return Err(MeshReadError::NoCells { skipped: self.skipped_cells });
@@ -139,7 +153,8 @@ impl Parts {
         let (tags, left_out) = self.tags.into_tags(&mesh, facets, regions)?;
         let skipped = self.skipped_cells + left_out;
         let loaded = loaded(mesh, self.fields, &self.metadata, skipped);
-        Ok(AnyMesh::Flat(LoadedMesh { tags, cell_fields, ..loaded }))
+        let skipped_fields = self.skipped_fields;
+        Ok(AnyMesh::Flat(LoadedMesh { tags, cell_fields, skipped_fields, ..loaded }))
     }
 }
 
@@ -151,6 +166,14 @@ pub(super) fn loaded<const D: usize>(
     skipped_cells: usize,
 ) -> LoadedMesh<D> {
     let (frame, provenance) = (metadata.frame(), metadata.provenance());
-    let (cell_fields, tags) = (vec![], Tags::default());
-    LoadedMesh { mesh, point_fields, cell_fields, tags, frame, provenance, skipped_cells }
+    LoadedMesh {
+        mesh,
+        point_fields,
+        cell_fields: Vec::new(),
+        tags: Tags::default(),
+        frame,
+        provenance,
+        skipped_cells,
+        skipped_fields: Vec::new(),
+    }
 }

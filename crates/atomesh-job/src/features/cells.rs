@@ -7,6 +7,7 @@ use std::path::Path;
 
 use atomesh::features::{FacetTest, FeatureFaces, FeatureFacetOptions, Selection};
 use atomesh::geometry::{Bounds, Point};
+use atomesh::image::Image;
 use atomesh::mesh::{PolyMesh, feature_name};
 use atomesh_io::mesh::CellFields;
 use atomesh_io::mesh::cells::{CellData, LoadedCells};
@@ -19,7 +20,7 @@ use crate::dimension::Dimension;
 use crate::error::JobError;
 use crate::files::{self, has_extension, write_bytes};
 use crate::images::{Beside, ImageRole};
-use crate::session::Session;
+use crate::session::{Note, NoteKind, Session};
 use crate::surfaces::{feature_groups, points_of};
 
 /// Finds features of cells, and writes them.
@@ -35,11 +36,79 @@ pub(super) fn run<const D: usize>(
 ) -> Result<FeaturesSummary, JobError> {
     files.check_dimension(D)?;
     check_options(request)?;
-    let (found, selection) = find(request, loaded, dimension, session)?;
-    let writing = Writing { files, loaded, found: &found, selection, dimension };
+    let image = match (names_features(request, loaded), request.source()) {
+        (false, Some(path)) => {
+            let (frame, provenance) = (Some(&loaded.frame), Some(&loaded.provenance));
+            let (options, role) = (&request.frame, ImageRole::Followed);
+            let beside = Beside { frame, provenance, options, role };
+            Some(beside.read(path, dimension, session)?)
+        }
+        (true, Some(path)) => {
+            let text = "is not read: the cells name their features; --below B chooses faces anew";
+            session.note(Note {
+                kind: NoteKind::Change,
+                file: Some(path.to_owned()),
+                text: text.into(),
+            });
+            None
+        }
+        (_, None) => None,
+    };
+    let found = features_of_cells(request, loaded, image, dimension, session)?;
+    let writing = Writing { files, loaded, found: &found, dimension };
     session.write_together(|group, session| writing.write(group, session))?;
-    let facets = found.of_faces.iter().filter(|of| **of > 0).count();
-    Ok(FeaturesSummary { features: found.areas.len(), facets, selection, from_points: false })
+    let FeaturesOfCells { faces, selection } = found;
+    let facets = count(&faces);
+    Ok(FeaturesSummary { features: faces.areas.len(), facets, selection, from_points: false })
+}
+
+/// Features among the faces of Voronoi cells.
+#[derive(Clone, Debug, PartialEq)]
+pub struct FeaturesOfCells {
+    /// The faces of each.
+    pub faces: FeatureFaces,
+    /// How many were chosen and dropped.
+    pub selection: Selection,
+}
+
+impl FeaturesOfCells {
+    /// The faces of a feature.
+    fn faces_of(&self, number: u32) -> impl Iterator<Item = usize> + '_ {
+        let all = self.faces.of_faces.iter().enumerate();
+        all.filter(move |(_, of)| **of == number).map(|(face, _)| face)
+    }
+
+    /// The mean of |b| over a feature, as −|b|; `None` where the file that names the feature does not say it.
+    fn mean<const D: usize>(&self, number: u32, cells: &PolyMesh<D>) -> Option<f64> {
+        let (mut sum, mut total) = (0.0, 0.0);
+        for face in self.faces_of(number) {
+            let area = length(&cells.area_vector(face));
+            sum -= area * f64::from(*self.faces.strengths.get(face)?);
+            total += area;
+        }
+        (total > 0.0).then(|| sum / total)
+    }
+
+    /// Each feature in numbers, in the coordinates of `cells`: "id", "name", "facets", "measure", "mean" of b, "min" and
+    /// "max".
+    pub fn report<const D: usize>(&self, cells: &PolyMesh<D>) -> Vec<Value> {
+        let one = |number: u32| {
+            let corners = self.faces_of(number).flat_map(|face| cells.face(face));
+            let points: Vec<Point<D>> = corners.map(|&c| cells.points()[c as usize]).collect();
+            let bounds = Bounds::of(&points);
+            let areas = self.faces_of(number).map(|face| length(&cells.area_vector(face)));
+            json!({
+                "id": number,
+                "name": feature_name(number),
+                "facets": self.faces_of(number).count(),
+                "measure": areas.sum::<f64>(),
+                "mean": self.mean(number, cells),
+                "min": bounds.map_or(vec![], |b| b.min.to_vec()),
+                "max": bounds.map_or(vec![], |b| b.max.to_vec()),
+            })
+        };
+        (1..=self.faces.areas.len() as u32).map(one).collect()
+    }
 }
 
 /// Refuses what Voronoi cells do not have.
@@ -65,39 +134,54 @@ fn check_options(request: &FeaturesRequest) -> Result<(), JobError> {
     }
 }
 
-/// The faces on features, and how many were chosen and dropped.
-fn find<const D: usize>(
+/// Whether the features that the cells name are taken.
+fn names_features<const D: usize>(request: &FeaturesRequest, loaded: &LoadedCells<D>) -> bool {
+    request.below.is_none() && !loaded.features.areas.is_empty()
+}
+
+/// How many faces are on features.
+fn count(found: &FeatureFaces) -> usize {
+    found.of_faces.iter().filter(|of| **of > 0).count()
+}
+
+/// Finds the faces of cells on features: those that the cells name, or by a threshold those along an image.
+///
+/// `image` is placed; it is b(x) itself if the request names a potential.
+///
+/// # Errors
+/// [`JobError`] if an option is of triangles and tetrahedra alone, the image is of no use, or there is none and the cells
+/// name no features.
+pub fn features_of_cells<const D: usize>(
     request: &FeaturesRequest,
     loaded: &LoadedCells<D>,
+    image: Option<Image<D>>,
     dimension: &Dimension<D>,
     session: &mut Session<'_>,
-) -> Result<(FeatureFaces, Selection), JobError> {
-    let count = |found: &FeatureFaces| found.of_faces.iter().filter(|of| **of > 0).count();
-    if request.below.is_none() && !loaded.features.areas.is_empty() {
-        let own = loaded.features.clone();
-        let selection = Selection { chosen: count(&own), ..Selection::default() };
-        return Ok((own, selection));
-    }
-    let Some(path) = request.source() else {
-        let message = "the cells name no features; expected IMAGE or --potential FILE";
-        return Err(JobError::misuse(message).about(&request.mesh));
+) -> Result<FeaturesOfCells, JobError> {
+    check_options(request)?;
+    let (found, least) = if names_features(request, loaded) {
+        (loaded.features.clone(), 1)
+    } else {
+        let Some(image) = image else {
+            let message = "the cells name no features; expected IMAGE or --potential FILE";
+            return Err(JobError::misuse(message).about(&request.mesh));
+        };
+        let made_by = Some(&loaded.provenance);
+        let (frame, units, potential) = potential(request, made_by, image, dimension, session)?;
+        let cells = (dimension.tools.lattice_cells)(&loaded.mesh, &frame, units);
+        let FeatureFacetOptions { below, min_facets, .. } = request.facet_options();
+        ((dimension.tools.feature_faces)(&cells, &potential, -below, 0.0), min_facets)
     };
-    let (frame, provenance) = (Some(&loaded.frame), Some(&loaded.provenance));
-    let beside = Beside { frame, provenance, options: &request.frame, role: ImageRole::Followed };
-    let image = beside.read(path, dimension, session)?;
-    let (frame, units, potential) = potential(request, provenance, image, dimension, session)?;
-    let cells = (dimension.tools.lattice_cells)(&loaded.mesh, &frame, units);
-    let least = -request.below.unwrap_or(FeatureFacetOptions::default().below);
-    let found = (dimension.tools.feature_faces)(&cells, &potential, least, 0.0);
     let chosen = count(&found);
-    let kept = large_enough(request, &loaded.mesh, found);
-    let selection = Selection { chosen, dropped: chosen - count(&kept), ..Selection::default() };
-    Ok((kept, selection))
+    let faces = large_enough(request, least, &loaded.mesh, found);
+    let selection = Selection { chosen, dropped: chosen - count(&faces), ..Selection::default() };
+    Ok(FeaturesOfCells { faces, selection })
 }
 
 /// The features that have enough faces, and enough length or area in the world, the largest first.
 fn large_enough<const D: usize>(
     request: &FeaturesRequest,
+    usual: usize,
     world: &PolyMesh<D>,
     mut found: FeatureFaces,
 ) -> FeatureFaces {
@@ -108,7 +192,8 @@ fn large_enough<const D: usize>(
         *area += length(&world.area_vector(face));
         *number = of;
     }
-    all.retain(|&(count, area, _)| count >= request.min_facets && area >= request.min_measure);
+    let least = request.min_facets.unwrap_or(usual);
+    all.retain(|&(count, area, _)| count >= least && area >= request.min_measure);
     all.sort_by(|a, b| b.1.total_cmp(&a.1)); // stable
     let mut number = vec![0; found.areas.len() + 1];
     all.iter().zip(1..).for_each(|(&(_, _, old), new)| number[old as usize] = new);
@@ -125,8 +210,7 @@ fn length<const D: usize>(vector: &Point<D>) -> f64 {
 struct Writing<'a, const D: usize> {
     files: &'a FeatureFiles<'a>,
     loaded: &'a LoadedCells<D>,
-    found: &'a FeatureFaces,
-    selection: Selection,
+    found: &'a FeaturesOfCells,
     dimension: &'a Dimension<D>,
 }
 
@@ -135,9 +219,10 @@ impl<const D: usize> Writing<'_, D> {
         let (cells, request) = (&self.loaded.mesh, self.files.request);
         if let Some((path, _)) = self.files.surface {
             let path = &files::stage(path, group)?;
-            let groups = feature_groups(cells, self.found);
-            let means: Option<Vec<f32>> =
-                (1..=groups.len() as u32).map(|n| self.mean(n).map(|mean| mean as f32)).collect();
+            let groups = feature_groups(cells, &self.found.faces);
+            let means: Option<Vec<f32>> = (1..=groups.len() as u32)
+                .map(|n| self.found.mean(n, cells).map(|mean| mean as f32))
+                .collect();
             let points = points_of(cells)?;
             let write = self.dimension.files.surface;
             let written = write(path, &points, &groups, means.as_deref(), session);
@@ -147,11 +232,9 @@ impl<const D: usize> Writing<'_, D> {
             self.write_cells(path, session)?;
         }
         if let Some(path) = &files::stage_any(&request.json, group)? {
-            let features: Vec<Value> =
-                (1..=self.found.areas.len() as u32).map(|number| self.report(number)).collect();
             let report = json!({
-                "selection": self.selection,
-                "features": features,
+                "selection": self.found.selection,
+                "features": self.found.report(cells),
                 "notes": session.notes_json(),
             });
             write_bytes(path, format!("{report:#}\n").as_bytes())?;
@@ -161,46 +244,12 @@ impl<const D: usize> Writing<'_, D> {
 
     fn write_cells(&self, path: &Path, session: &mut Session<'_>) -> Result<(), JobError> {
         let LoadedCells { mesh, fields, frame, provenance, .. } = self.loaded;
-        let data = CellData { mesh, features: self.found, frame, provenance };
+        let data = CellData { mesh, features: &self.found.faces, frame, provenance };
         let mut all = CellFields::new(mesh.cell_count());
         for field in fields {
             all = all.with_numbers(&field.name, &field.values).map_err(JobError::content)?;
         }
         let written = (self.dimension.files.cells_with)(path, &data, &all, session);
         written.map_err(|e| JobError::from(e).about(path))
-    }
-
-    /// The faces of a feature.
-    fn faces(&self, number: u32) -> impl Iterator<Item = usize> + '_ {
-        let all = self.found.of_faces.iter().enumerate();
-        all.filter(move |(_, of)| **of == number).map(|(face, _)| face)
-    }
-
-    /// The mean of |b| over a feature, as −|b|; `None` where the file that names the feature does not say it.
-    fn mean(&self, number: u32) -> Option<f64> {
-        let (mut sum, mut total) = (0.0, 0.0);
-        for face in self.faces(number) {
-            let area = length(&self.loaded.mesh.area_vector(face));
-            sum -= area * f64::from(*self.found.strengths.get(face)?);
-            total += area;
-        }
-        (total > 0.0).then(|| sum / total)
-    }
-
-    /// A feature in numbers, in world coordinates.
-    fn report(&self, number: u32) -> Value {
-        let cells = &self.loaded.mesh;
-        let corners = self.faces(number).flat_map(|face| cells.face(face));
-        let points: Vec<Point<D>> = corners.map(|&c| cells.points()[c as usize]).collect();
-        let bounds = Bounds::of(&points);
-        json!({
-            "id": number,
-            "name": feature_name(number),
-            "facets": self.faces(number).count(),
-            "measure": self.faces(number).map(|face| length(&cells.area_vector(face))).sum::<f64>(),
-            "mean": self.mean(number),
-            "min": bounds.map_or(vec![], |b| b.min.to_vec()),
-            "max": bounds.map_or(vec![], |b| b.max.to_vec()),
-        })
     }
 }

@@ -11,7 +11,7 @@ use atomesh::features::{
 };
 use atomesh::fields::ScalarField;
 use atomesh::image::{Frame, Image, Units};
-use atomesh::mesh::is_feature_name;
+use atomesh::mesh::{FacetGroup, Tags, is_feature_name};
 use atomesh::run::MeshOptions;
 use atomesh_io::mesh::{LoadedMesh, Provenance};
 
@@ -23,6 +23,7 @@ use crate::options::{FrameOptions, PotentialOptions, RunConfig};
 use crate::session::Session;
 #[cfg(feature = "clap")]
 use crate::values::{named, number_in};
+pub use cells::{FeaturesOfCells, features_of_cells};
 use write::FeatureFiles;
 
 /// A mesh, the image whose features its facets follow, and where they go.
@@ -69,9 +70,9 @@ pub struct FeaturesRequest {
     #[cfg_attr(feature = "clap", arg(long, value_name = "VALUE", default_value = "mean",
         value_parser = named::<FacetTest>(&["mean", "max"])))]
     pub test: FacetTest,
-    /// Pieces of fewer facets are dropped
-    #[cfg_attr(feature = "clap", arg(long, value_name = "COUNT", default_value_t = Self::default().min_facets))]
-    pub min_facets: usize,
+    /// Pieces of fewer facets are dropped. Default: 3; of features that the mesh names, none is dropped
+    #[cfg_attr(feature = "clap", arg(long, value_name = "COUNT"))]
+    pub min_facets: Option<usize>,
     /// Pieces of less length (2-D) or area (3-D), in world units, are dropped
     #[cfg_attr(feature = "clap", arg(long, value_name = "MEASURE", default_value_t = Self::default().min_measure,
         value_parser = number_in(0.0, f64::MAX, "a number of 0 or more")))]
@@ -94,7 +95,7 @@ pub struct FeaturesRequest {
 
 impl Default for FeaturesRequest {
     fn default() -> Self {
-        let FeatureFacetOptions { test, min_facets, min_measure, close_gaps, .. } =
+        let FeatureFacetOptions { test, min_measure, close_gaps, .. } =
             FeatureFacetOptions::default();
         Self {
             mesh: PathBuf::new(),
@@ -107,7 +108,7 @@ impl Default for FeaturesRequest {
             json: None,
             below: None,
             test,
-            min_facets,
+            min_facets: None,
             min_measure,
             close_gaps,
             units: None,
@@ -125,13 +126,27 @@ impl FeaturesRequest {
 
     /// How facets are chosen.
     pub fn facet_options(&self) -> FeatureFacetOptions {
+        let usual = FeatureFacetOptions::default();
         FeatureFacetOptions {
-            below: self.below.unwrap_or(FeatureFacetOptions::default().below),
+            below: self.below.unwrap_or(usual.below),
             test: self.test,
-            min_facets: self.min_facets,
+            min_facets: self.min_facets.unwrap_or(usual.min_facets),
             min_measure: self.min_measure,
             close_gaps: self.close_gaps,
         }
+    }
+}
+
+impl FeaturesRequest {
+    /// Refuses options that choose facets where the mesh's own features are taken.
+    ///
+    /// # Errors
+    /// [`JobError`] names the option.
+    fn check_own(&self) -> Result<(), JobError> {
+        let given = [(self.close_gaps, "--close-gaps"), (self.test != FacetTest::Mean, "--test")];
+        let Some((_, option)) = given.iter().find(|(is_given, _)| *is_given) else { return Ok(()) };
+        let message = format!("{option} is of facets chosen by b, and the mesh names its features");
+        Err(JobError::misuse(message).about(&self.mesh).advise("--below B chooses facets anew"))
     }
 }
 
@@ -162,30 +177,54 @@ pub fn features<const D: usize>(
     dimension: &Dimension<D>,
     session: &mut Session<'_>,
 ) -> Result<FeatureSet<D>, JobError> {
-    if let (None, Some(found)) = (request.below, own_features(loaded)) {
-        return Ok(found);
-    }
-    let field = match image {
-        Some(image) => along(request, loaded, image, dimension, session)?,
-        None => {
-            let Some(values) = loaded.point_field("potential") else {
-                let message =
-                    "the mesh has no field `potential`; expected IMAGE or --potential FILE";
-                return Err(JobError::misuse(message).about(&request.mesh));
-            };
-            FacetField::from_points(&loaded.mesh, values)
-                .map_err(|e| JobError::from(e).about(&request.mesh))?
+    let field = match (image, loaded.point_field("potential")) {
+        (Some(image), _) => Some(along(request, loaded, image, dimension, session)?),
+        (None, Some(values)) => {
+            let field = FacetField::from_points(&loaded.mesh, values);
+            Some(field.map_err(|e| JobError::from(e).about(&request.mesh))?)
         }
+        (None, None) => None,
+    };
+    if request.below.is_none() && has_own_features(&loaded.tags) {
+        return own_features(request, loaded, field.as_ref());
+    }
+    let Some(field) = field else {
+        let message = "the mesh has no field `potential`; expected IMAGE or --potential FILE";
+        return Err(JobError::misuse(message).about(&request.mesh));
     };
     Ok((dimension.tools.find_features)(&loaded.mesh, &field, &request.facet_options())?)
 }
 
-/// The features that the mesh's tags name, if they name any.
-fn own_features<const D: usize>(loaded: &LoadedMesh<D>) -> Option<FeatureSet<D>> {
+/// Whether tags name features.
+fn has_own_features<const D: usize>(tags: &Tags<D>) -> bool {
+    tags.facet_groups().iter().any(|group| is_feature_name(&group.name))
+}
+
+/// The features that the mesh's tags name, those that are large enough, with the mean of b along them where there is a b.
+fn own_features<const D: usize>(
+    request: &FeaturesRequest,
+    loaded: &LoadedMesh<D>,
+    field: Option<&FacetField<D>>,
+) -> Result<FeatureSet<D>, JobError> {
+    request.check_own()?;
+    let mesh = &loaded.mesh;
     let groups = loaded.tags.facet_groups().iter().filter(|group| is_feature_name(&group.name));
-    let groups: Vec<FacetsOfFeature<D>> =
-        groups.map(|group| FacetsOfFeature { facets: group.facets.clone(), mean: -1.0 }).collect();
-    (!groups.is_empty()).then(|| FeatureSet::of_groups(&loaded.mesh, &groups))
+    let of_feature = |group: &FacetGroup<D>| {
+        let mut ascending = group.facets.clone();
+        ascending.iter_mut().for_each(|corners| corners.sort_unstable());
+        let mean = field.and_then(|field| field.mean_over(mesh, &ascending));
+        FacetsOfFeature { facets: group.facets.clone(), mean: mean.unwrap_or(f64::NAN) }
+    };
+    let all: Vec<FacetsOfFeature<D>> = groups.map(of_feature).collect();
+    let count = |of: &[FacetsOfFeature<D>]| of.iter().map(|one| one.facets.len()).sum::<usize>();
+    let chosen = count(&all);
+    let is_large_enough = |one: &FacetsOfFeature<D>| {
+        one.facets.len() >= request.min_facets.unwrap_or(1)
+            && one.measure(mesh) >= request.min_measure
+    };
+    let kept: Vec<_> = all.into_iter().filter(is_large_enough).collect();
+    let selection = Selection { chosen, dropped: chosen - count(&kept), ..Selection::default() };
+    Ok(FeatureSet { selection, ..FeatureSet::of_groups(mesh, &kept) })
 }
 
 /// b along the facets, from an image or potential.
@@ -238,7 +277,11 @@ pub fn features_file(
     session: &mut Session<'_>,
 ) -> Result<FeaturesSummary, JobError> {
     let files = FeatureFiles::new(request, session)?;
-    match mesh_file::read(&request.mesh, session)? {
+    let file = mesh_file::read(&request.mesh, session)?;
+    if request.mesh_output.is_some() {
+        file.note_skipped(&request.mesh, session);
+    }
+    match file {
         MeshFile::Flat(mesh) => run(request, &files, &mesh, &Dimension::plane(), session),
         MeshFile::Volume(mesh) => run(request, &files, &mesh, &Dimension::space(), session),
         MeshFile::Polygons(mesh) => {
@@ -265,7 +308,9 @@ fn run<const D: usize>(
         Some(path) => Some(beside.read(path, dimension, session)?),
         None => None,
     };
-    let from_points = image.is_none();
+    // the mesh's own facets need no b to be chosen by
+    let from_points =
+        image.is_none() && (request.below.is_some() || !has_own_features(&loaded.tags));
     let found = features(request, loaded, image, dimension, session)?;
     files.write(loaded, &found, dimension, session)?;
     let facets = found.features.iter().map(|feature| feature.facets.len()).sum();

@@ -96,8 +96,8 @@ impl<'a> FeatureFiles<'a> {
         if let Some((path, _)) = self.surface {
             let path = &files::stage(path, group)?;
             let means: Vec<f32> = found.features.iter().map(|f| f.mean as f32).collect();
-            let written =
-                (dimension.files.surface)(path, mesh, &found.groups(), Some(&means), session);
+            let known = means.iter().all(|mean| mean.is_finite()).then_some(&means[..]);
+            let written = (dimension.files.surface)(path, mesh, &found.groups(), known, session);
             written.map_err(|e| JobError::from(e).about(path))?;
         }
         if let (Some(path), Some(named)) =

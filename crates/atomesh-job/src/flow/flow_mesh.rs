@@ -81,7 +81,7 @@ pub(super) fn read(path: &Path, session: &mut Session<'_>) -> Result<AnyFlowMesh
 impl<const D: usize> FlowMesh<D> {
     /// Voronoi cells as read.
     pub fn of_cells(loaded: LoadedCells<D>) -> Self {
-        let LoadedCells { mesh, features, fields, frame, provenance } = loaded;
+        let LoadedCells { mesh, features, fields, frame, provenance, .. } = loaded;
         Self {
             cells: FlowMeshCells::Voronoi { cells: Box::new(mesh), features },
             cell_fields: fields,

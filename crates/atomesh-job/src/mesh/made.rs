@@ -54,6 +54,7 @@ impl<const D: usize> MadeMesh<'_, D> {
             frame: Some(*outcome.frame()),
             provenance: Some(self.run.provenance::<D>().in_units(self.units)),
             skipped_cells: 0,
+            skipped_fields: Vec::new(),
         })
     }
 
@@ -64,6 +65,7 @@ impl<const D: usize> MadeMesh<'_, D> {
             mesh: outcome.world_cells()?,
             features: outcome.cell_features().unwrap_or_default(),
             fields: Vec::new(),
+            skipped_fields: Vec::new(),
             frame: *outcome.frame(),
             provenance: self.run.provenance::<D>().in_units(self.units),
         })

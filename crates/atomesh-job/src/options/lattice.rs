@@ -54,8 +54,8 @@ section! {
         #[arg(long, value_name = "KIND",
             value_parser = named::<LatticeKind>(&["hexagonal", "bcc", "fcc", "random"]))]
         pub lattice: LatticeKind,
-        /// Share γ of the edge length that an atom of the starting lattice keeps free of others, 0.1 to 1.
-        /// Default: 0.8
+        /// Share γ of the edge length that an atom of the starting lattice keeps free of others, 0.1 to 1. Where the
+        /// length varies, a small share makes edges shorter than it: less than a third of it is refused. Default: 0.8
         #[arg(long, value_name = "GAMMA",
             value_parser = number_in(0.1, 1.0, "a number from 0.1 to 1"))]
         pub spacing_factor: f64,

@@ -102,8 +102,8 @@ impl RunConfig {
     /// # Errors
     /// [`JobError`] names the file, if it cannot be read or parsed.
     pub fn or_file(self, path: &Path) -> Result<Self, JobError> {
-        let text = std::fs::read_to_string(path)
-            .map_err(|e| JobError::file(format!("cannot be read: {e}")).about(path))?;
+        let text =
+            std::fs::read_to_string(path).map_err(|e| JobError::unreadable(&e).about(path))?;
         Ok(self.or(Self::parse(&text).map_err(|f| f.about(path))?))
     }
 

@@ -10,7 +10,11 @@ class InputError(Error, ValueError):
 
 
 class FileError(Error, OSError):
-    """A file that cannot be read or written."""
+    """A file that cannot be read or written: `filename`, and `errno` where the system refused it."""
+
+    def __str__(self) -> str:
+        # OSError's own words would be for system calls
+        return str(self.args[0]) if len(self.args) == 1 else super().__str__()
 
 
 class MemoryForecastError(Error, MemoryError):

@@ -132,9 +132,13 @@ pub trait Body: Send + Sync {
     /// [`JobError`] if there is no image, or none of this dimension.
     fn picture(&self, image: Option<AnyImage>, max_side: f64) -> Result<Vec<u8>, JobError>;
 
-    /// An editor of the atoms.
+    /// An editor of the atoms, over another image in the same place if one is given.
     ///
     /// # Errors
-    /// [`JobError`] if the mesh was not made from an image in this process, or is part of one.
-    fn editor(&self, session: &mut Session<'_>) -> Result<Box<dyn EditorBody>, JobError>;
+    /// [`JobError`] if the mesh was not made from an image in this process, or is part of one, or the image is elsewhere.
+    fn editor(
+        &self,
+        image: Option<AnyImage>,
+        session: &mut Session<'_>,
+    ) -> Result<Box<dyn EditorBody>, JobError>;
 }

@@ -7,16 +7,20 @@ use atomesh_draw::Style;
 use atomesh_io::image::AnyImage;
 use atomesh_io::mesh::OwnedField;
 use atomesh_io::mesh::cells::LoadedCells;
-use atomesh_job::features::FeaturesRequest;
+use atomesh_job::features::{FeaturesRequest, features_of_cells};
 use atomesh_job::flow::{FlowMesh, FlowOptions};
+use atomesh_job::measure::measure_cells;
 use atomesh_job::options::{OutputOptions, RunConfig};
 use atomesh_job::sample::{Property, SampleRequest};
-use atomesh_job::surfaces::groups_of_cells;
+use atomesh_job::surfaces::{feature_groups, groups_of_cells};
 use atomesh_job::{Dimension, JobError, Session};
 use serde_json::Value;
 
+use super::Made;
 use super::body::{Body, Group};
-use super::{Made, in_dimension, meta, of_file};
+use super::images::{self, in_dimension, of_file};
+use super::meta::meta;
+use super::written::written;
 use crate::edit::EditorBody;
 use crate::flow::{FlowBody, Flowing, solved};
 use crate::surface::Surface;
@@ -138,36 +142,41 @@ impl<const D: usize> Body for CellsBody<D> {
 
     fn report(
         &self,
-        _: &RunConfig,
+        run: &RunConfig,
         image: Option<AnyImage>,
         session: &mut Session<'_>,
     ) -> Result<Value, JobError> {
-        match (&self.made, image) {
-            (Some(made), None) => made.as_job(&made.run, &[]).report(&self.dimension, session),
-            (None, None) => Err(of_file("report")),
-            _ => {
-                let message =
-                    "Voronoi cells are measured against the image that they were made from";
-                Err(JobError::misuse(message))
-            }
+        let Some(image) = image else {
+            let made = self.made.as_ref().ok_or_else(|| of_file("report"))?;
+            return made.as_job(&made.run, &[]).report(&self.dimension, session);
+        };
+        let (request, mut against) = images::against(run, image, &self.dimension, session)?;
+        if against.image.take().is_some() {
+            session.change("fidelity is of triangles and tetrahedra; the report leaves it out");
         }
+        let report = measure_cells(&request, &self.loaded, &against, &self.dimension, session)?;
+        serde_json::to_value(report).map_err(JobError::content)
     }
 
     fn features(
         &self,
         request: &FeaturesRequest,
         image: Option<AnyImage>,
-        _: &mut Session<'_>,
+        session: &mut Session<'_>,
     ) -> Result<Vec<Surface>, JobError> {
-        if image.is_some() || request.below.is_some() {
-            let message = "the faces of Voronoi cells on features were chosen when they were made";
+        let Self { loaded, dimension, .. } = self;
+        if image.is_some() && request.below.is_none() && !loaded.features.areas.is_empty() {
+            let message = "the cells name their features; expected no image, or --below B too";
             return Err(JobError::misuse(message));
         }
-        let own = self.facets.iter().filter(|group| atomesh::mesh::is_feature_name(&group.name));
-        let surface = |group: &FacetGroup<D>| {
-            Surface::new(group.name.clone(), self.loaded.mesh.points(), &group.facets, Value::Null)
+        let image = images::placed(request, image, dimension)?;
+        let found = features_of_cells(request, loaded, image, dimension, session)?;
+        let (cells, faces) = (&loaded.mesh, &found.faces);
+        let groups = feature_groups(cells, faces).into_iter().zip(found.report(cells));
+        let surface = |(FacetGroup { name, facets, .. }, info): (FacetGroup<D>, Value)| {
+            Surface::new(name, cells.points(), &facets, info)
         };
-        Ok(own.map(surface).collect())
+        Ok(groups.map(surface).collect())
     }
 
     fn surface(&self, name: &str) -> Result<Surface, JobError> {
@@ -188,7 +197,7 @@ impl<const D: usize> Body for CellsBody<D> {
         image: AnyImage,
         session: &mut Session<'_>,
     ) -> Result<Vec<f64>, JobError> {
-        super::sampled(request, name, &self.loaded, image, &self.dimension, session)
+        images::sampled(request, name, &self.loaded, image, &self.dimension, session)
     }
 
     fn flow(
@@ -209,12 +218,12 @@ impl<const D: usize> Body for CellsBody<D> {
         session: &mut Session<'_>,
     ) -> Result<(), JobError> {
         let Self { made, loaded, dimension, .. } = self;
-        super::written(made.as_ref(), loaded, output, properties, dimension, session)
+        written(made.as_ref(), loaded, output, properties, dimension, session)
     }
 
     fn picture(&self, image: Option<AnyImage>, max_side: f64) -> Result<Vec<u8>, JobError> {
         let given = image.map(|image| in_dimension(image, &self.dimension)).transpose()?;
-        let image = super::backdrop(given.as_ref(), self.made.as_ref())?;
+        let image = images::backdrop(given.as_ref(), self.made.as_ref())?;
         let frame = &self.loaded.frame;
         let place = |p: &[f64; D]| frame.world_to_lattice(Units::Samples, p);
         let cells = self.loaded.mesh.moved(frame.is_mirrored(), place);
@@ -222,9 +231,14 @@ impl<const D: usize> Body for CellsBody<D> {
         super::png((self.dimension.drawing.cells)(image, &cells, &style))
     }
 
-    fn editor(&self, session: &mut Session<'_>) -> Result<Box<dyn EditorBody>, JobError> {
+    fn editor(
+        &self,
+        image: Option<AnyImage>,
+        session: &mut Session<'_>,
+    ) -> Result<Box<dyn EditorBody>, JobError> {
         let made = self.made.as_ref().ok_or_else(super::not_made)?;
         let sites = made.outcome.cells().and_then(PolyMesh::sites).unwrap_or_default();
-        crate::edit::editor(made, sites, self.dimension.clone(), session)
+        let image = images::over(image, &made.image, &self.dimension)?;
+        crate::edit::editor(made, image, sites, self.dimension.clone(), session)
     }
 }

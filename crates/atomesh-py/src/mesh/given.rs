@@ -65,6 +65,7 @@ pub fn body<const D: usize>(
         frame: None,
         provenance: None,
         skipped_cells: 0,
+        skipped_fields: Vec::new(),
     };
     Ok(Box::new(SimplexBody::new(loaded, None, dimension)))
 }

@@ -7,15 +7,18 @@ use atomesh_io::image::AnyImage;
 use atomesh_io::mesh::{LoadedMesh, OwnedField};
 use atomesh_job::features::FeaturesRequest;
 use atomesh_job::flow::{FlowMesh, FlowOptions};
-use atomesh_job::measure::{Against, MeasureRequest, measure};
+use atomesh_job::measure::measure;
 use atomesh_job::options::{OutputOptions, RunConfig};
 use atomesh_job::sample::{Property, SampleRequest};
 use atomesh_job::surfaces::{SurfacesRequest, surfaces};
 use atomesh_job::{Dimension, JobError, Session, mesh_file};
 use serde_json::Value;
 
+use super::Made;
 use super::body::{Body, Group};
-use super::{Made, in_dimension, meta, of_file};
+use super::images::{self, in_dimension, of_file};
+use super::meta::meta;
+use super::written::written;
 use crate::edit::EditorBody;
 use crate::flow::{FlowBody, Flowing, solved};
 use crate::surface::Surface;
@@ -112,14 +115,7 @@ impl<const D: usize> Body for SimplexBody<D> {
             let made = self.made.as_ref().ok_or_else(|| of_file("report"))?;
             return made.as_job(&made.run, &[]).report(&self.dimension, session);
         };
-        let image = run.frame.place(in_dimension(image, &self.dimension)?)?;
-        let units = run.lattice.units.unwrap_or_default();
-        let potential =
-            atomesh_job::enhance::enhance(&image, &run.features, units, &self.dimension, session)?;
-        let mut against = Against::potential(potential.image)?;
-        against.image = Some(image);
-        let size = run.lattice.wanted_length();
-        let request = MeasureRequest { size, units: run.lattice.units, ..Default::default() };
+        let (request, against) = images::against(run, image, &self.dimension, session)?;
         let report = measure(&request, &self.loaded, &against, &self.dimension, session)?;
         serde_json::to_value(report).map_err(JobError::content)
     }
@@ -130,8 +126,7 @@ impl<const D: usize> Body for SimplexBody<D> {
         image: Option<AnyImage>,
         session: &mut Session<'_>,
     ) -> Result<Vec<Surface>, JobError> {
-        let image = image.map(|image| in_dimension(image, &self.dimension)).transpose()?;
-        let image = image.map(|image| request.frame.place(image)).transpose()?;
+        let image = images::placed(request, image, &self.dimension)?;
         let found = match (&self.made, request.below, &image) {
             // the run's own b, which is known between points too
             (Some(made), Some(_), None) => {
@@ -179,7 +174,7 @@ impl<const D: usize> Body for SimplexBody<D> {
         image: AnyImage,
         session: &mut Session<'_>,
     ) -> Result<Vec<f64>, JobError> {
-        super::sampled(request, name, &self.loaded, image, &self.dimension, session)
+        images::sampled(request, name, &self.loaded, image, &self.dimension, session)
     }
 
     fn flow(
@@ -200,20 +195,31 @@ impl<const D: usize> Body for SimplexBody<D> {
         session: &mut Session<'_>,
     ) -> Result<(), JobError> {
         let Self { made, loaded, dimension, .. } = self;
-        super::written(made.as_ref(), loaded, output, properties, dimension, session)
+        written(made.as_ref(), loaded, output, properties, dimension, session)
     }
 
     fn picture(&self, image: Option<AnyImage>, max_side: f64) -> Result<Vec<u8>, JobError> {
         let given = image.map(|image| in_dimension(image, &self.dimension)).transpose()?;
-        let image = super::backdrop(given.as_ref(), self.made.as_ref())?;
+        let image = images::backdrop(given.as_ref(), self.made.as_ref())?;
         let frame = self.loaded.frame.as_ref().unwrap_or(image.frame());
         let mesh = (self.dimension.tools.lattice_mesh)(&self.loaded.mesh, frame, Units::Samples);
         let style = Style { max_side, ..Style::default() };
         super::png((self.dimension.drawing.mesh)(image, &mesh, &style))
     }
 
-    fn editor(&self, session: &mut Session<'_>) -> Result<Box<dyn EditorBody>, JobError> {
+    fn editor(
+        &self,
+        image: Option<AnyImage>,
+        session: &mut Session<'_>,
+    ) -> Result<Box<dyn EditorBody>, JobError> {
         let made = self.made.as_ref().ok_or_else(super::not_made)?;
-        crate::edit::editor(made, made.outcome.mesh().points(), self.dimension.clone(), session)
+        let image = images::over(image, &made.image, &self.dimension)?;
+        crate::edit::editor(
+            made,
+            image,
+            made.outcome.mesh().points(),
+            self.dimension.clone(),
+            session,
+        )
     }
 }

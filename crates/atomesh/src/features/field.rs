@@ -2,7 +2,7 @@
 
 use rayon::prelude::*;
 
-use super::{FacetTest, FeaturesError};
+use super::{FacetTest, FeaturesError, measure_and_mean};
 use crate::fields::ScalarField;
 use crate::geometry::{Point, distance_squared, dot};
 use crate::mesh::{Facet, Mesh, area_vector};
@@ -132,6 +132,17 @@ impl<const D: usize> FacetField<D> {
     /// The mean of b along each facet.
     pub fn mean(&self) -> &[f64] {
         &self.mean
+    }
+
+    /// The mean of b over some of the facets, corners ascending, weighted by length or area; `None` if none of them lies
+    /// between two cells. `mesh` is theirs, in any coordinates.
+    pub fn mean_over(&self, mesh: &Mesh<D>, facets: &[[u32; D]]) -> Option<f64> {
+        let found = facets.iter().filter_map(|corners| {
+            let at = self.facets.binary_search_by(|facet| facet.corners.cmp(corners)).ok()?;
+            Some((corners, self.mean[at]))
+        });
+        let (measure, mean) = measure_and_mean(mesh, found);
+        (measure > 0.0).then_some(mean)
     }
 
     /// The greatest b along each facet.

@@ -105,7 +105,7 @@ pub struct Feature<const D: usize> {
     /// its lowest-numbered point. In 3-D they ascend by corners, and their normals agree, with the sum of them
     /// positive along the axis where it is longest.
     pub facets: Vec<[u32; D]>,
-    /// The mean of b over the piece, weighted by length or area.
+    /// The mean of b over the piece, weighted by length or area; NaN where it is not known.
     pub mean: f64,
     /// Whether all normals agree; on a one-sided surface they cannot.
     pub orientable: bool,
@@ -118,8 +118,18 @@ pub struct Feature<const D: usize> {
 pub struct FacetsOfFeature<const D: usize> {
     /// The facets, in any order.
     pub facets: Vec<[u32; D]>,
-    /// The mean of b over them.
+    /// The mean of b over them; NaN where it is not known.
     pub mean: f64,
+}
+
+impl<const D: usize> FacetsOfFeature<D> {
+    /// Their length (2-D) or area (3-D), in the coordinates of `mesh`.
+    ///
+    /// # Panics
+    /// If a corner is not a point of the mesh.
+    pub fn measure(&self, mesh: &Mesh<D>) -> f64 {
+        self.facets.iter().map(|facet| measure_of(mesh, facet)).sum()
+    }
 }
 
 /// The features of a mesh.
@@ -155,7 +165,7 @@ pub struct FeatureReport {
     pub facets: usize,
     /// Its length (2-D) or area (3-D).
     pub measure: f64,
-    /// The mean of b over it.
+    /// The mean of b over it; NaN, in JSON null, where it is not known.
     pub mean: f64,
     /// The least coordinates along each axis.
     pub min: Vec<f64>,

@@ -104,6 +104,8 @@ pub(super) struct RawCells {
     /// The points, padded like sites, and the cells' faces, where the file has them.
     pub faces: Option<(Vec<Point<3>>, CellFaces)>,
     pub fields: Vec<OwnedField<f64>>,
+    /// The names of fields of cells that are no scalars.
+    pub skipped_fields: Vec<String>,
     /// The feature of each face between two cells that lies on one, from 1 on.
     pub features: BTreeMap<(u32, u32), u32>,
     pub metadata: Metadata,

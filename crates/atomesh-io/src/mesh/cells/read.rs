@@ -33,6 +33,8 @@ pub struct LoadedCells<const D: usize> {
     pub features: FeatureFaces,
     /// The scalar fields in the cells, in the file's order.
     pub fields: Vec<OwnedField<f64>>,
+    /// The names of fields left out: vectors, and values that are no numbers.
+    pub skipped_fields: Vec<String>,
     /// The frame of the image that the cells follow.
     pub frame: Frame<D>,
     /// Where they come from.
@@ -144,7 +146,8 @@ fn loaded<const D: usize>(
     };
     check_volumes(&mesh, &raw.volumes)?;
     let features = features(&mesh, &raw.features);
-    Ok(LoadedCells { mesh, features, fields: raw.fields, frame, provenance })
+    let RawCells { fields, skipped_fields, .. } = raw;
+    Ok(LoadedCells { mesh, features, fields, skipped_fields, frame, provenance })
 }
 
 fn flat<const D: usize>(place: &Point<3>) -> Point<D> {

@@ -39,6 +39,13 @@ pub(super) fn read_cells_vtu(bytes: &[u8]) -> Result<RawCells, MeshReadError> {
         let Ok(values) = array.reals(piece.cells) else { continue };
         fields.push(OwnedField { name: array.name.into(), values });
     }
+    let is_left = |array: &&Array| {
+        array.name != "site"
+            && !known.contains(&array.name)
+            && !fields.iter().any(|field| field.name == array.name)
+    };
+    let skipped_fields =
+        piece.cell_data.iter().filter(is_left).map(|array| array.name.to_owned()).collect();
     let text = document.field_data.iter().find(|array| array.name == metadata::NAME);
     let text = text.map(Array::string).transpose()?.unwrap_or_default();
     let cells = RawCells {
@@ -46,6 +53,7 @@ pub(super) fn read_cells_vtu(bytes: &[u8]) -> Result<RawCells, MeshReadError> {
         sites: sites.as_chunks::<3>().0.to_vec(),
         volumes: named("volume")?.reals(piece.cells)?,
         fields,
+        skipped_fields,
         faces: Some((points(piece)?, faces(piece, dimension)?)),
         features: features(&document.field_data)?,
         metadata: Metadata::decode(&text),

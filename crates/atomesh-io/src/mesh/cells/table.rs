@@ -56,6 +56,7 @@ pub(super) fn read_list(path: &Path) -> Result<RawCells, CellReadError> {
         sites: (0..count).map(place).collect(),
         volumes: cells.column("volume")?,
         fields: fields?,
+        skipped_fields: Vec::new(),
         features: features.map(|((i, j), f)| ((i as u32, j as u32), f as u32)).collect(),
         metadata: Metadata::decode(text.as_bytes()),
     })

@@ -77,6 +77,21 @@ impl Names {
     }
 }
 
+/// How many nodes a triangle or tetrahedron of that type has, whatever it stands for: stress, heat, sound, membrane, rigid
+/// ...; 0 for other elements. Letters after the count say how it is solved (C3D10MH, S3RS).
+fn node_count(kind: &str) -> usize {
+    let shape = kind.trim_end_matches(|c: char| "himprst".contains(c));
+    match shape {
+        "c3d4" | "dc3d4" | "ac3d4" => 4,
+        "c3d10" | "dc3d10" | "ac3d10" => 10,
+        "cps3" | "cpe3" | "cpeg3" | "cax3" | "cgax3" | "dc2d3" | "dcax3" | "ac2d3" | "acax3"
+        | "s3" | "ds3" | "stri3" | "m3d3" | "r3d3" | "sfm3d3" => 3,
+        "cps6" | "cpe6" | "cpeg6" | "cax6" | "cgax6" | "dc2d6" | "dcax6" | "ac2d6" | "acax6"
+        | "s6" | "ds6" | "stri65" | "m3d6" | "sfm3d6" => 6,
+        _ => 0,
+    }
+}
+
 #[derive(Default)]
 struct Reader {
     section: Section,
@@ -133,13 +148,7 @@ impl Reader {
         match keyword.as_str() {
             "NODE" => Section::Nodes,
             "ELEMENT" => {
-                let count = match option("TYPE").as_str() {
-                    "c3d4" => 4,
-                    "c3d10" => 10,
-                    "cps3" | "cpe3" | "cax3" | "s3" | "stri3" => 3,
-                    "cps6" | "cpe6" | "cax6" | "s6" => 6,
-                    _ => 0,
-                };
+                let count = node_count(&option("TYPE"));
                 let name = option("ELSET");
                 let named = !name.is_empty() && name != CELLS;
                 let set = named.then(|| {

@@ -90,7 +90,7 @@ impl<'a> Archive<'a> {
         }
         let mesh = Mesh::new(points, corners)?;
         let names: Vec<String> = self.zip.file_names().map(str::to_owned).collect();
-        let (mut fields, mut cell_fields) = (Vec::new(), Vec::new());
+        let (mut fields, mut cell_fields, mut skipped) = (Vec::new(), Vec::new(), Vec::new());
         for name in names.iter().filter_map(|n| n.strip_suffix(".npy")) {
             if ["points", "cells", "metadata"].contains(&name) {
                 continue;
@@ -101,15 +101,19 @@ impl<'a> Archive<'a> {
                     && let Some(values) = array.numbers()
                 {
                     cell_fields.push(OwnedField { name: name.into(), values: values? });
+                } else {
+                    skipped.push(name.into());
                 }
             } else if array.shape == [mesh.points().len() as u64] {
                 let values = array.reals()?.into_iter().map(|v| v as f32).collect();
                 fields.push(OwnedField { name: array.name, values });
+            } else {
+                skipped.push(array.name);
             }
         }
         let metadata = self.metadata()?;
         let mut loaded = loaded(mesh, fields, &metadata, 0);
-        loaded.cell_fields = cell_fields;
+        (loaded.cell_fields, loaded.skipped_fields) = (cell_fields, skipped);
         Ok(loaded)
     }
 

@@ -21,7 +21,13 @@ pub fn read_vtk(bytes: &[u8]) -> Result<AnyMesh, MeshReadError> {
         reader.section(keyword, &mut parts)?;
     }
     reader.cells.add_to(&mut parts)?;
-    parts.fields.retain(|f| f.values.len() == parts.points.len());
+    let (points, all) = (parts.points.len(), std::mem::take(&mut parts.fields));
+    for field in all {
+        match field.values.len() == points {
+            true => parts.fields.push(field),
+            false => parts.skip_field(&field.name),
+        }
+    }
     parts.into_mesh()
 }
 
@@ -87,8 +93,8 @@ impl<'a> Reader<'a> {
             "CELL_DATA" => self.values_at = Some(Values::Cells(self.count()?)),
             "FIELD" => self.field(parts)?,
             "SCALARS" => self.scalars(parts)?,
-            "VECTORS" | "NORMALS" => self.skip_values(3)?,
-            "TENSORS" => self.skip_values(9)?,
+            "VECTORS" | "NORMALS" => self.skip_values(3, parts)?,
+            "TENSORS" => self.skip_values(9, parts)?,
             "LOOKUP_TABLE" => {
                 self.word()?;
                 let count = self.count()?;
@@ -171,15 +177,15 @@ impl<'a> Reader<'a> {
         Ok(())
     }
 
-    fn skip_values(&mut self, components: usize) -> Result<(), MeshReadError> {
-        self.word()?;
+    fn skip_values(&mut self, components: usize, parts: &mut Parts) -> Result<(), MeshReadError> {
+        parts.skip_field(self.word()?);
         let kind = self.word()?;
         self.numbers(kind, self.tuples()?, components)?;
         Ok(())
     }
 
     fn keep(&self, parts: &mut Parts, name: &str, components: usize, values: Vec<f64>) {
-        let name = name.into();
+        let name: String = name.into();
         match self.values_at {
             Some(Values::Points(n)) if components == 1 && n == values.len() => {
                 let values = values.into_iter().map(|v| v as f32).collect();
@@ -188,7 +194,8 @@ impl<'a> Reader<'a> {
             Some(Values::Cells(n)) if components == 1 && n == values.len() => {
                 parts.cell_fields.push(OwnedField { name, values });
             }
-            _ => {}
+            Some(_) => parts.skip_field(&name),
+            None => {} // of the file
         }
     }
 
@@ -278,14 +285,14 @@ impl<'a> Reader<'a> {
         }
         self.line()?; // the data begin on the next line
         match kind {
-            "char" | "signed_char" => self.take::<i8>(count),
-            "unsigned_char" => self.take::<u8>(count),
-            "short" => self.take::<i16>(count),
-            "unsigned_short" => self.take::<u16>(count),
-            "int" => self.take::<i32>(count),
-            "unsigned_int" => self.take::<u32>(count),
+            "char" | "signed_char" | "vtktypeint8" => self.take::<i8>(count),
+            "unsigned_char" | "vtktypeuint8" => self.take::<u8>(count),
+            "short" | "vtktypeint16" => self.take::<i16>(count),
+            "unsigned_short" | "vtktypeuint16" => self.take::<u16>(count),
+            "int" | "vtktypeint32" => self.take::<i32>(count),
+            "unsigned_int" | "vtktypeuint32" => self.take::<u32>(count),
             "long" | "vtktypeint64" | "vtkIdType" => self.take::<i64>(count),
-            "unsigned_long" => self.take::<u64>(count),
+            "unsigned_long" | "vtktypeuint64" => self.take::<u64>(count),
             "float" => self.take::<f32>(count),
             "double" => self.take::<f64>(count),
             _ => Err(MeshReadError::Unsupported {

@@ -259,19 +259,29 @@ fn is_region(array: &Array) -> bool {
     array.name == "region" && array.is_integer() && array.components == 1
 }
 
-/// Appends the fields of one more piece to those of the pieces before.
-fn append<T: Clone>(fields: &mut Vec<OwnedField<T>>, more: Vec<OwnedField<T>>, first: bool) {
+/// Appends the fields of one more piece to those of the pieces before; the names of those that not all pieces have.
+fn append<T: Clone>(
+    fields: &mut Vec<OwnedField<T>>,
+    more: Vec<OwnedField<T>>,
+    first: bool,
+) -> Vec<String> {
     if first {
         *fields = more;
-        return;
+        return Vec::new();
     }
+    let of_some = more.iter().filter(|new| !fields.iter().any(|old| old.name == new.name));
+    let mut lost: Vec<String> = of_some.map(|field| field.name.clone()).collect();
     fields.retain_mut(|old| match more.iter().find(|new| new.name == old.name) {
         Some(new) => {
             old.values.extend_from_slice(&new.values);
             true
         }
-        None => false,
+        None => {
+            lost.push(old.name.clone());
+            false
+        }
     });
+    lost
 }
 
 impl<'a> Piece<'a> {
@@ -305,27 +315,38 @@ impl<'a> Piece<'a> {
         self.add_cells(parts, base)?;
 
         let mut fields = Vec::new();
-        for array in self.point_data.iter().filter(|a| a.components == 1 && !a.name.is_empty()) {
+        for array in self.point_data.iter().filter(|a| !a.name.is_empty()) {
+            if array.components != 1 {
+                parts.skip_field(array.name);
+                continue;
+            }
             let values = array.reals(self.points)?.into_iter().map(|v| v as f32).collect();
             fields.push(OwnedField { name: array.name.into(), values });
         }
-        append(&mut parts.fields, fields, first);
-        append(&mut parts.cell_fields, self.cell_fields()?, first);
+        let mut lost = append(&mut parts.fields, fields, first);
+        let (fields, skipped) = self.cell_fields()?;
+        lost.extend(append(&mut parts.cell_fields, fields, first));
+        lost.extend(skipped);
+        lost.iter().for_each(|name| parts.skip_field(name));
         Ok(())
     }
 
-    /// The scalar fields in the cells; those of types that are not numbers are passed over.
-    fn cell_fields(&self) -> Result<Vec<OwnedField<f64>>, MeshReadError> {
-        let mut fields = Vec::new();
-        let is_field = |a: &&Array| a.components == 1 && !a.name.is_empty() && !is_region(a);
-        for array in self.cell_data.iter().filter(is_field) {
+    /// The scalar fields in the cells, and the names of those that are passed over: of several components, or of types that
+    /// are not numbers.
+    fn cell_fields(&self) -> Result<(Vec<OwnedField<f64>>, Vec<String>), MeshReadError> {
+        let (mut fields, mut skipped) = (Vec::new(), Vec::new());
+        for array in self.cell_data.iter().filter(|a| !a.name.is_empty() && !is_region(a)) {
+            if array.components != 1 {
+                skipped.push(array.name.into());
+                continue;
+            }
             match array.reals(self.cells) {
                 Ok(values) => fields.push(OwnedField { name: array.name.into(), values }),
-                Err(MeshReadError::Unsupported { .. }) => {}
+                Err(MeshReadError::Unsupported { .. }) => skipped.push(array.name.into()),
                 Err(e) => return Err(e),
             }
         }
-        Ok(fields)
+        Ok((fields, skipped))
     }
 
     fn add_cells(&self, parts: &mut Parts, base: u32) -> Result<(), MeshReadError> {

@@ -39,9 +39,11 @@ impl Reader<'_> {
                 }
             }
         }
-        if keep && of_cells {
+        if !keep {
+            self.parts.skip_field(&name);
+        } else if of_cells {
             self.parts.cell_fields.push(OwnedField { name, values });
-        } else if keep {
+        } else {
             let values = values.into_iter().map(|v| v as f32).collect();
             self.parts.fields.push(OwnedField { name, values });
         }
