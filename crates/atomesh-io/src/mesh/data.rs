@@ -5,6 +5,7 @@ use atomesh::mesh::{Mesh, Quadratic, Tags};
 
 use super::cell_fields::{CellFields, VectorField};
 use super::field::{Field, MeshDataError, Values, check_field};
+use super::inp::Sections;
 use super::metadata;
 use super::provenance::Provenance;
 
@@ -19,6 +20,7 @@ pub struct MeshData<'a, const D: usize> {
     provenance: Option<&'a Provenance>,
     tags: Option<&'a Tags<D>>,
     quadratic: Option<&'a Quadratic<D>>,
+    sections: Option<&'a Sections>,
 }
 
 impl<'a, const D: usize> MeshData<'a, D> {
@@ -32,6 +34,7 @@ impl<'a, const D: usize> MeshData<'a, D> {
             provenance: None,
             tags: None,
             quadratic: None,
+            sections: None,
         }
     }
 
@@ -125,6 +128,17 @@ impl<'a, const D: usize> MeshData<'a, D> {
     pub fn with_tags(mut self, tags: &'a Tags<D>) -> Self {
         self.tags = Some(tags);
         self
+    }
+
+    /// The same with sections; formats other than Abaqus' leave them out.
+    pub fn with_sections(mut self, sections: &'a Sections) -> Self {
+        self.sections = Some(sections);
+        self
+    }
+
+    /// The sections, if there are any.
+    pub fn sections(&self) -> Option<&'a Sections> {
+        self.sections
     }
 
     /// The mesh, in world coordinates.

@@ -39,6 +39,7 @@ pub use error::MeshWriteError;
 pub use field::{Field, MeshDataError, OwnedField, Values};
 pub use fluxes::{FacetFlux, FluxFiles, FluxTable, write_fluxes};
 pub use format::{MeshFormat, UnknownMeshFormat};
+pub use inp::{Elastic, SectionKind, Sections};
 pub use loaded::{AnyMesh, LoadedMesh};
 pub use provenance::Provenance;
 pub use read_error::MeshReadError;

@@ -6,6 +6,7 @@ use atomesh::image::{Between, Frame, Image, Samples as SampleValues};
 use atomesh::run::Inputs;
 use atomesh_io::image::{LoadedImage, Meaning, ReadOptions};
 
+use super::phases;
 use crate::dimension::Dimension;
 use crate::error::JobError;
 use crate::images::{self, is_bare, is_placed, scaled, unit_ratio};
@@ -161,6 +162,9 @@ impl<const D: usize> MeshImages<D> {
         let weight_field = field(given.weight_field, weight, FieldKind::WEIGHT)?;
         let mask = field(given.mask, input.mask_file(), FieldKind::MASK)?;
         let labels = field(given.labels, input.labels.as_deref(), FieldKind::LABELS)?;
+        if labels.is_some() && run.regions.threshold.is_some() {
+            return Err(JobError::misuse("--labels and --threshold; expected one of them"));
+        }
         // without IMAGE, the potential is the image
         let is_beside = input.image.is_some() || given.potential.is_some();
         let beside = input.potential.as_deref().filter(|_| is_beside);
@@ -170,6 +174,12 @@ impl<const D: usize> MeshImages<D> {
             true => live_mask(&image, shown, session),
             false => mask,
         };
+        let labels = match phases::by_thresholds(run, &image, session)? {
+            Some(phases) => Some(phases),
+            None => labels,
+        };
+        let mask = phases::without_voids(run, mask, labels.as_ref(), session)?;
+        let size_field = phases::sizes(run, size_field, labels.as_ref(), session)?;
         let Samples { units, .. } = of;
         Ok(Self { image, is_potential, potential, size_field, weight_field, mask, labels, units })
     }
@@ -250,7 +260,7 @@ fn meaning(run: &RunConfig) -> Meaning {
     let input = &run.input;
     let is_labels = match (&input.image, &input.potential, &input.labels) {
         (None, None, Some(_)) => true,
-        (Some(_), None, None) => run.features.are_labels(),
+        (Some(_), None, None) => run.features.are_labels() && run.regions.threshold.is_none(),
         _ => false,
     };
     if is_labels { Meaning::Labels } else { Meaning::Brightness }

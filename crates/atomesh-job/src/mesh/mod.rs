@@ -9,6 +9,7 @@ mod format;
 mod inputs;
 mod made;
 mod outputs;
+mod phases;
 mod refusal;
 mod write;
 

@@ -3,6 +3,7 @@
 use std::path::{Path, PathBuf};
 
 use atomesh_io::mesh::cells::ConnectionFiles;
+use atomesh_io::mesh::{Elastic, MeshFormat, Sections};
 use atomesh_io::output_group::OutputGroup;
 
 use super::format::{MshWish, OutputFormat};
@@ -10,6 +11,7 @@ use crate::error::JobError;
 use crate::files::{self, PictureFile, has_extension, unknown_extension};
 use crate::options::{Backdrop, OutputOptions, RunConfig};
 use crate::session::Session;
+use crate::values::{MaterialSpec, Text};
 
 /// Where everything goes.
 #[derive(Clone, Debug)]
@@ -27,6 +29,8 @@ pub(super) struct Outputs {
     pub config: Option<PathBuf>,
     /// Whether cells of second order are written.
     pub is_quadratic: bool,
+    /// What the cells are in Abaqus' file, and their materials.
+    pub sections: Option<Sections>,
     /// Facets with b up to this are tagged as features.
     pub tag_features: Option<f64>,
     /// The parts that features cut off become regions, unless they have fewer cells than this.
@@ -66,6 +70,7 @@ impl Outputs {
             return Err(JobError::misuse(message).about(&mesh));
         }
         let regions = regions(run)?;
+        let sections = sections(options, &mesh, format)?;
         if let (Some(page), true) = (&html, is_voronoi) {
             let refusal =
                 JobError::misuse("a page shows triangles or tetrahedra, not Voronoi cells");
@@ -82,6 +87,7 @@ impl Outputs {
             potential: options.write_potential.clone(),
             config: config.map(Path::to_path_buf),
             is_quadratic,
+            sections,
             tag_features: options.tag_features,
             regions,
         })
@@ -100,6 +106,7 @@ impl Outputs {
             html: files::stage_any(&self.html, group)?,
             potential: files::stage_any(&self.potential, group)?,
             config: files::stage_any(&self.config, group)?,
+            sections: self.sections.clone(),
             ..*self
         })
     }
@@ -183,6 +190,33 @@ fn reports(options: &OutputOptions) -> Result<(Option<PathBuf>, Option<PathBuf>)
         (Some(page), None) if has_extension(&page, "html") => Ok((None, Some(page))),
         other => Ok(other),
     }
+}
+
+/// The sections that options ask for.
+///
+/// # Errors
+/// [`JobError`] if the file holds none, or materials stand without sections.
+fn sections(
+    options: &OutputOptions,
+    mesh: &Path,
+    format: OutputFormat,
+) -> Result<Option<Sections>, JobError> {
+    let materials = options.material.as_deref().unwrap_or_default();
+    let Some(kind) = options.section else {
+        return match materials {
+            [] => Ok(None),
+            _ => Err(JobError::misuse("--material without --section; expected both")),
+        };
+    };
+    if format != OutputFormat::Simplices(MeshFormat::Inp) {
+        return Err(JobError::misuse("--section is for .inp files (Abaqus)").about(mesh));
+    }
+    let elastic = |Text(given): &Text<MaterialSpec>| Elastic {
+        region: given.region,
+        youngs_modulus: given.youngs_modulus,
+        poissons_ratio: given.poissons_ratio,
+    };
+    Ok(Some(Sections { kind, materials: materials.iter().map(elastic).collect() }))
 }
 
 /// The least size of the parts that become regions, if they do.

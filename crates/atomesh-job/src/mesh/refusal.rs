@@ -33,6 +33,9 @@ pub fn refusal(run: &RunConfig, error: RunError) -> JobError {
                 .advise("give it once, or two that are farther apart")
                 .about_any(shown)
         }
+        RunError::NoVelocity { .. } => JobError::content(error)
+            .about_any(shown)
+            .advise("--size MIN..MAX beside --frequency gives a least length"),
         RunError::Frame { .. } => JobError::content(error)
             .about_any(shown)
             .advise("--origin puts the samples nearer to 0, where numbers are dense"),
@@ -81,9 +84,6 @@ fn distance(run: &RunConfig, error: &DistanceError) -> JobError {
         _ if run.input.size_field.is_some() => {
             JobError::content(error).about_any(run.input.size_field.as_deref())
         }
-        DistanceError::FieldValue { .. } => JobError::content(error)
-            .about_any(shown)
-            .advise("--frequency needs an image of velocities above 0"),
         DistanceError::BelowStep { .. } if run.lattice.frequency.is_some() => {
             JobError::misuse(error)
                 .about_any(shown)

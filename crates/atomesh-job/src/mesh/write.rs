@@ -10,7 +10,7 @@ use atomesh::run::Outcome;
 use atomesh::watch::Phase;
 use atomesh_draw::Style;
 use atomesh_io::mesh::cells::CellData;
-use atomesh_io::mesh::{MeshData, MeshFormat, Provenance};
+use atomesh_io::mesh::{MeshData, MeshFormat, Provenance, Sections};
 
 use super::format::OutputFormat;
 use super::outputs::Outputs;
@@ -119,12 +119,18 @@ impl<const D: usize> Writing<'_, D> {
         let labels = outcome.labels().filter(|_| !self.outputs.format.holds_tags());
         let labels = labels.map(|l| l.iter().map(|&l| l as f32).collect::<Vec<f32>>());
         let (tags, tagged) = self.tags(&mesh, session)?;
+        if let Some(sections) = &self.outputs.sections {
+            check_sections::<D>(sections, tags.regions(), session)?;
+        }
         let mut data = MeshData::new(&mesh)
             .with_frame(outcome.frame())
             .with_provenance(provenance)
             .with_tags(&tags);
         if let Some(quadratic) = &quadratic {
             data = data.with_quadratic(quadratic);
+        }
+        if let Some(sections) = &self.outputs.sections {
+            data = data.with_sections(sections);
         }
         data = data.with_point_field("distance", &distance).map_err(JobError::content)?;
         data = data.with_point_field("potential", &values).map_err(JobError::content)?;
@@ -203,6 +209,33 @@ impl<const D: usize> Writing<'_, D> {
         }
         Ok(())
     }
+}
+
+/// Refuses sections of another dimension, and says which materials fill no region.
+///
+/// # Errors
+/// [`JobError`] names the section.
+fn check_sections<const D: usize>(
+    sections: &Sections,
+    regions: Option<&Regions>,
+    session: &mut Session<'_>,
+) -> Result<(), JobError> {
+    if !sections.kind.is_of_dimension(D) {
+        let message = match D {
+            2 => {
+                "--section solid of triangles; expected plane-stress, plane-strain or axisymmetric"
+            }
+            _ => "--section of triangles for tetrahedra; expected solid",
+        };
+        return Err(JobError::misuse(message));
+    }
+    let ids = regions.map(Regions::ids).unwrap_or_default();
+    let unused =
+        sections.materials.iter().filter(|of| regions.is_some() && !ids.contains(&of.region));
+    for material in unused {
+        session.change(format_args!("--material of region {}, which no cell has", material.region));
+    }
+    Ok(())
 }
 
 /// The tags with regions beside them.

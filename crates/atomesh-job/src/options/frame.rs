@@ -41,6 +41,12 @@ section! {
         /// Default: the image's, else the world's axes
         #[arg(long, value_name = "M11,M12,...", allow_hyphen_values = true)]
         pub direction: Numbers,
+        /// Let y grow upwards: the rows of the image run down from the greatest y, so that photographs (PNG, JPEG,
+        /// TIFF) stand upright in programs whose y points up, such as Abaqus and Gmsh. The box stays. Default: false, rows
+        /// run along y as they come
+        #[arg(long, value_name = "BOOL", num_args = 0..=1, require_equals = true,
+            default_missing_value = "true")]
+        pub y_up: bool,
         /// Box of interest in world coordinates, rounded outward to whole samples
         #[arg(long, value_name = "X0..X1,Y0..Y1[,Z0..Z1]", allow_hyphen_values = true)]
         pub crop: Text<WorldBox>,
@@ -94,6 +100,25 @@ section! {
         #[arg(long, value_name = "AXIS", value_parser = named::<Vertical>(&["time", "depth"]))]
         pub vertical: Vertical,
     }
+}
+
+/// The frame over the same box whose rows run down from the greatest y.
+///
+/// # Errors
+/// [`JobError`] if its axes are not the world's: then it says itself which way is up.
+fn upright<const D: usize>(frame: Frame<D>) -> Result<Frame<D>, JobError> {
+    let unit = |r: usize, c: usize| f64::from(u8::from(r == c));
+    let mut rows = frame.direction();
+    if (0..D * D).any(|at| rows[at / D][at % D] != unit(at / D, at % D)) {
+        let message =
+            "--y-up is for images whose axes are the world's; expected no other direction";
+        return Err(JobError::misuse(message));
+    }
+    rows[1][1] = -1.0;
+    let mut origin = frame.origin();
+    origin[1] += (frame.shape()[1] - 1) as f64 * frame.spacing()[1];
+    let turned = frame.with_origin(origin).and_then(|frame| frame.with_direction(rows));
+    turned.map_err(JobError::misuse)
 }
 
 /// The names of the options of a frame, for messages.
@@ -178,6 +203,9 @@ impl FrameOptions {
             }
             let rows = std::array::from_fn(|r| std::array::from_fn(|c| direction[r * D + c]));
             frame = frame.with_direction(rows).map_err(misuse)?;
+        }
+        if self.y_up == Some(true) {
+            frame = upright(frame)?;
         }
         Ok(frame)
     }

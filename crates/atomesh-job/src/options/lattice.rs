@@ -33,8 +33,9 @@ section! {
             value_parser = named::<GradeBy>(&["density", "curvature", "distance"]))]
         pub grade_by: GradeBy,
         /// Greatest frequency f of waves in 1/s, where IMAGE holds their velocity v: edges are v / f /
-        /// --points-per-wavelength long; replaces --size
-        #[arg(long, value_name = "HZ", conflicts_with_all = ["size", "size_field"],
+        /// --points-per-wavelength long, within --size MIN..MAX if that is given too. Where v is 0 (shear waves in
+        /// water), MIN is taken
+        #[arg(long, value_name = "HZ", conflicts_with = "size_field",
             value_parser = number_in(f64::MIN_POSITIVE, f64::MAX, "a frequency above 0"))]
         pub frequency: f64,
         /// Edges in a wavelength, above 0; with --frequency. Default: 5
@@ -86,8 +87,18 @@ impl LatticeOptions {
             (Some(_), ..) if self.units == Some(Units::Samples) => {
                 Err(JobError::misuse("--frequency with --units samples; expected physical units"))
             }
-            (Some(frequency), points, _) => {
-                Ok(Size::Wavelength { frequency, points: points.unwrap_or(POINTS_PER_WAVELENGTH) })
+            (Some(frequency), points, size) => {
+                let (least, greatest) = match size.map(|size| size.0) {
+                    None => (None, None),
+                    Some(Size::Range { min, max }) => (Some(min), Some(max)),
+                    Some(_) => {
+                        let message = "--frequency with one --size; expected MIN..MAX, the least and \
+                                       the greatest edge length";
+                        return Err(JobError::misuse(message));
+                    }
+                };
+                let points = points.unwrap_or(POINTS_PER_WAVELENGTH);
+                Ok(Size::Wavelength { frequency, points, least, greatest })
             }
         }
     }

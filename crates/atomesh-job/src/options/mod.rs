@@ -167,7 +167,10 @@ impl RunConfig {
                 smooth: features.smooth,
                 ..Default::default()
             },
-            regions: RegionOptions { least_island: Some(mesh.least_island as u64) },
+            regions: RegionOptions {
+                least_island: Some(mesh.least_island as u64),
+                ..Default::default()
+            },
             optimize: OptimizerOptions::spelt(&mesh.optimize, mesh.interpolation),
             improve: ImprovementOptions {
                 align: Some(mesh.improve.align),
@@ -182,7 +185,11 @@ impl RunConfig {
             // the options of features have no part in the run
             defaults.features = PotentialOptions::default();
         }
-        self.or(defaults)
+        let mut given = self;
+        if given.regions.threshold.is_some() {
+            given.follow_labels();
+        }
+        given.or(defaults)
     }
 
     /// The options that the core takes.
@@ -191,7 +198,11 @@ impl RunConfig {
     /// [`JobError`] if a seed point has another number of coordinates, or a value from a configuration
     /// is out of its range.
     pub fn mesh_options<const D: usize>(&self) -> Result<MeshOptions<D>, JobError> {
-        let (lattice, features, moves) = (&self.lattice, &self.features, &self.optimize);
+        let mut features = self.features.clone();
+        if self.regions.threshold.is_some() {
+            features.features.get_or_insert(Text(Features::Labels.into())); // boundaries between phases
+        }
+        let (lattice, moves) = (&self.lattice, &self.optimize);
         let default = MeshOptions::<D>::for_kind(lattice.mesh.unwrap_or_default());
         let seeds = lattice.seed_point.iter().flatten();
         let optimize = moves.optimize_options(default.optimize);
@@ -301,8 +312,16 @@ mod tests {
         let both = line.clone().or(file);
         let size = both.mesh_options::<2>().unwrap().size;
         let points = POINTS_PER_WAVELENGTH;
-        assert_eq!(size, Size::Wavelength { frequency: 2.0, points });
+        assert_eq!(size, Size::Wavelength { frequency: 2.0, points, least: None, greatest: None });
         assert_eq!(both.with_defaults::<2>().lattice.points_per_wavelength, Some(points));
+
+        line.lattice.size = Some("20..90".parse().unwrap());
+        let bounds =
+            Size::Wavelength { frequency: 2.0, points, least: Some(20.0), greatest: Some(90.0) };
+        assert_eq!(line.mesh_options::<2>().unwrap().size, bounds);
+        line.lattice.size = Some("20".parse().unwrap());
+        assert!(line.check().is_err());
+        line.lattice.size = None;
 
         line.lattice.units = Some(Units::Samples);
         assert!(line.check().is_err());

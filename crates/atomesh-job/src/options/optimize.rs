@@ -5,6 +5,7 @@ use atomesh::improve::{Align, ImproveOptions};
 use atomesh::optimize::{EngineKind, OptimizeOptions};
 
 use super::section::section;
+use crate::values::{LabelSize, Labels, Numbers, Text};
 #[cfg(feature = "clap")]
 use crate::values::{named, number_in};
 
@@ -115,5 +116,20 @@ section! {
         /// neighbours. Default: 0
         #[arg(long, value_name = "COUNT", value_parser = clap::value_parser!(u64).range(0..=1_000_000_000))]
         pub least_island: u64,
+        /// Values of IMAGE, ascending, that part it into phases, in place of --labels: label 0 below the first, 1 from it
+        /// up to the next, and so on. With --denoise, of the image without its noise. The phases' boundaries are the
+        /// features, unless --features says others
+        #[arg(long, value_name = "A[,B...]", allow_hyphen_values = true, conflicts_with = "labels")]
+        pub threshold: Numbers,
+        /// Labels that are left out: the mesh ends at their smooth outline, as at that of a mask
+        #[arg(long, value_name = "LABEL[,...]", allow_hyphen_values = true, conflicts_with = "only")]
+        pub void: Text<Labels>,
+        /// The labels that are meshed; all others are left out, as by --void
+        #[arg(long, value_name = "LABEL[,...]", allow_hyphen_values = true)]
+        pub only: Text<Labels>,
+        /// Edge length wanted where a label is, in lattice units; elsewhere it is --size, and between them it grows by 1 for
+        /// each 4 units of way. May be given many times
+        #[arg(long, value_name = "LABEL=D", allow_hyphen_values = true)]
+        pub size_of: Vec<Text<LabelSize>>,
     }
 }

@@ -4,7 +4,10 @@ use std::path::PathBuf;
 
 use serde::{Deserialize, Serialize};
 
+use atomesh_io::mesh::SectionKind;
+
 use super::section::section;
+use crate::values::{MaterialSpec, Text};
 #[cfg(feature = "clap")]
 use crate::values::{named, number_in};
 
@@ -41,6 +44,16 @@ section! {
         /// outline. Default: 1
         #[arg(long, value_name = "ORDER", value_parser = clap::value_parser!(u8).range(1..=2))]
         pub order: u8,
+        /// Abaqus: write what the cells are, in sections of one material for each region, called as the region: solid (3-D),
+        /// plane-stress or plane-strain of thickness 1, or axisymmetric about the y axis (2-D). Default: plane stress in
+        /// 2-D, and no sections
+        #[arg(long, value_name = "KIND",
+            value_parser = named::<SectionKind>(SectionKind::NAMES))]
+        pub section: SectionKind,
+        /// Abaqus: write the elastic material of a region beside its section: Young's modulus E and Poisson's ratio
+        /// NU. May be given many times
+        #[arg(long, value_name = "REGION=E,NU", allow_hyphen_values = true)]
+        pub material: Vec<Text<MaterialSpec>>,
         /// Tag facets along which the mean of b is at most this (-1 to 1, such as -0.2) as features, beside the
         /// sides of the box; `features` offers more choice. Not in .vtk and .npz
         #[arg(long, value_name = "B", allow_hyphen_values = true,

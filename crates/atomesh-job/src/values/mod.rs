@@ -2,12 +2,16 @@
 
 #[cfg(feature = "clap")]
 mod arguments;
+mod labels;
+mod materials;
 mod size;
 mod wells;
 mod world_box;
 
 #[cfg(feature = "clap")]
 pub use arguments::{count_in, named, number_in};
+pub use labels::{LabelSize, Labels};
+pub use materials::MaterialSpec;
 pub use size::SizeValue;
 pub use wells::{BarrierSpec, SideSpec, WellSpec};
 pub use world_box::WorldBox;

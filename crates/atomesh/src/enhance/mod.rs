@@ -36,7 +36,7 @@ pub use options::{EdgeOperator, FeatureOptions, Features};
 pub use thin::{CrestOptions, FaultOptions, HorizonOptions, Polarity};
 
 use crate::crests::FeaturePoint;
-use crate::image::{Grid, Image, Samples};
+use crate::image::{Grid, Image, Samples, Units};
 use crate::watch::{Cancelled, Phase, Watch, check};
 use rayon::prelude::*;
 use scale::UnitSamples;
@@ -140,13 +140,27 @@ fn denoised<const D: usize>(
     if matches!(options.features, Features::Labels | Features::None) {
         return Ok(None);
     }
+    without_noise(image, strength, options.units, watch).map(Some)
+}
+
+/// The image without its noise, in single precision: [`denoise`] with a `strength` from 0.01 to 10, in a lattice of those
+/// units. Samples without data are continued from their neighbours.
+///
+/// # Errors
+/// [`EnhanceError`] if a sample is not finite, the strength is out of range, or the watch ends the work.
+pub fn without_noise<const D: usize>(
+    image: &Image<D>,
+    strength: f64,
+    units: Units,
+    watch: &mut dyn Watch,
+) -> Result<Image<D>, EnhanceError> {
     UnitSamples::new(image.samples())?; // refuses what is not finite
     let denoising = DenoiseOptions { strength, ..DenoiseOptions::for_dimension(D) };
-    let grid = image.frame().grid(options.units);
+    let grid = image.frame().grid(units);
     let values = image.continued().as_ref().unwrap_or(image).samples().to_f32();
     let clean = denoise(&values, &grid, &denoising, watch)?;
     let clean = image.clone().with_samples(Samples::F32(clean.into()));
-    Ok(Some(clean.expect("there are as many samples as before")))
+    Ok(clean.expect("there are as many samples as before"))
 }
 
 /// Points on the features of an image, in lattice coordinates: crests between samples, whatever the potential is made

@@ -92,6 +92,21 @@ pub enum RunError {
         /// Bytes allowed.
         available: u64,
     },
+    /// Velocities that carry no waves, with no least length to take there.
+    #[error(
+        "{count} of {all} velocities are 0 or less, or no numbers, first at sample {index}: {value}; expected values above 0, \
+         or a least edge length, which is taken where no waves travel (shear waves in water)"
+    )]
+    NoVelocity {
+        /// How many.
+        count: usize,
+        /// How many samples there are.
+        all: usize,
+        /// The first of them, x fastest.
+        index: usize,
+        /// Its value.
+        value: f64,
+    },
     /// A spacing factor so small that a graded lattice would be another than asked for.
     #[error(
         "with the spacing factor {factor}, edges of a lattice that varies would be about {share:.2} of the nominal \
@@ -240,6 +255,18 @@ pub enum Warning {
         /// A place on the strongest of them, in world coordinates.
         place: String,
     },
+    /// Velocities that carry no waves.
+    #[error(
+        "{count} of {all} velocities are 0 or less, where no waves travel (shear waves in water): the least edge length, {least}, is taken there"
+    )]
+    NoVelocity {
+        /// How many.
+        count: usize,
+        /// How many samples there are.
+        all: usize,
+        /// The length taken.
+        least: f64,
+    },
     /// A small spacing factor, with which a graded lattice is denser than asked for.
     #[error(
         "with the spacing factor {factor}, atoms of a lattice that varies stand wherever others leave room: edges are about {share:.2} of the nominal distance"
@@ -293,7 +320,7 @@ pub enum Warning {
 impl Warning {
     /// Whether this is a choice made for the user, not something amiss.
     pub fn is_note(&self) -> bool {
-        matches!(self, Self::TurnedOnly { .. })
+        matches!(self, Self::TurnedOnly { .. } | Self::NoVelocity { .. })
     }
 }
 

@@ -35,6 +35,13 @@ pub enum Size {
         frequency: f64,
         /// Edges in a wavelength.
         points: f64,
+        /// The least length; it is that where no waves travel (v = 0, such as shear waves in water) too. `None`: as short as
+        /// the least v says, and v = 0 is refused.
+        #[serde(default)]
+        least: Option<f64>,
+        /// The greatest length. `None`: as long as the greatest v says.
+        #[serde(default)]
+        greatest: Option<f64>,
     },
 }
 

@@ -50,7 +50,7 @@ pub(super) fn prepare<const D: usize>(
     let Enhanced { values: mut samples, crests, .. } =
         enhanced(&inputs, &options, &mut warnings, watch)?;
     check(watch, Phase::Distance, 0.0, None)?;
-    let distance = nominal_distance(&inputs, &grid, &options, &samples)?;
+    let distance = nominal_distance(&inputs, &grid, &options, &samples, &mut warnings)?;
     let outline = outline(&inputs, grid, &distance, watch)?;
     if let Some(outline) = &outline {
         outline.combine(&mut samples);
@@ -323,6 +323,7 @@ fn nominal_distance<const D: usize>(
     grid: &Grid<D>,
     options: &MeshOptions<D>,
     samples: &[f32],
+    warnings: &mut Vec<Warning>,
 ) -> Result<NominalDistance<D>, RunError> {
     if let Some(field) = inputs.size_field {
         same_shape("size field", inputs.image.frame(), field)?;
@@ -336,14 +337,36 @@ fn nominal_distance<const D: usize>(
             let grading = Grading { by: options.grade_by, ..Grading::new(min, max) };
             NominalDistance::from_potential(grid, samples, &grading)?
         }
-        Size::Wavelength { frequency, points } => {
-            let rate = (frequency * points) as f32;
+        Size::Wavelength { frequency, points, least, greatest } => {
             let continued = inputs.image.continued();
-            let mut lengths = continued.as_ref().unwrap_or(inputs.image).samples().to_f32();
-            lengths.iter_mut().for_each(|v| *v /= rate);
+            let velocities = continued.as_ref().unwrap_or(inputs.image).samples().to_f32();
+            let still = check_velocities(&velocities, least)?;
+            warnings.extend(still);
+            let rate = (frequency * points) as f32;
+            let (least, greatest) = (least.unwrap_or(0.0), greatest.unwrap_or(f64::MAX));
+            let length = |v: f32| (v / rate).max(least as f32).min(greatest as f32);
+            let lengths: Vec<f32> = velocities.into_iter().map(length).collect();
             NominalDistance::from_field(grid, &lengths, GRADIENT_LIMIT)?
         }
     })
+}
+
+/// Says how many velocities carry no waves, where there is a least length to take there.
+///
+/// # Errors
+/// [`RunError::NoVelocity`] where there is none.
+fn check_velocities(velocities: &[f32], least: Option<f64>) -> Result<Option<Warning>, RunError> {
+    let is_still = |v: &f32| v.is_nan() || *v <= 0.0;
+    let Some(index) = velocities.iter().position(is_still) else { return Ok(None) };
+    let (count, all) =
+        (velocities.iter().copied().filter(|v| is_still(v)).count(), velocities.len());
+    match least {
+        Some(least) => Ok(Some(Warning::NoVelocity { count, all, least })),
+        None => {
+            let value = velocities[index].into();
+            Err(RunError::NoVelocity { count, all, index, value })
+        }
+    }
 }
 
 fn same_shape<const D: usize>(

@@ -260,7 +260,7 @@ fn edges_are_a_share_of_a_wavelength() {
     let frame = Frame::new([101, 101]).unwrap().with_spacing([20.0, 20.0]).unwrap();
     let velocities = image(frame, |i| 1500.0 + 6.0 * i[1] as f32);
     let features = FeatureOptions { features: Features::None, ..Default::default() };
-    let size = Size::Wavelength { frequency: 2.0, points: 5.0 };
+    let size = Size::Wavelength { frequency: 2.0, points: 5.0, least: None, greatest: None };
     let options = MeshOptions { features, size, ..Default::default() };
     let outcome = run(&Method::plane(), &velocities, options.clone()).unwrap();
     assert_sound(&outcome, "wavelength");
@@ -274,8 +274,14 @@ fn edges_are_a_share_of_a_wavelength() {
     let mean = outcome.report(&mut Silent).unwrap().shape.edge_mean;
     assert!((160.0..205.0).contains(&mean), "{mean}: about 180, the middle of 150 to 210");
     let still = image(frame, |i| if i == [5, 1] { 0.0 } else { 1500.0 });
-    let error = run(&Method::plane(), &still, options).unwrap_err().to_string();
-    assert!(error.contains("distance 0 at sample 106"), "{error}");
+    let error = run(&Method::plane(), &still, options.clone()).unwrap_err().to_string();
+    assert!(error.contains("1 of 10201 velocities") && error.contains("sample 106: 0"), "{error}");
+    // with bounds, still water takes the least length, and rock no more than the greatest
+    let size =
+        Size::Wavelength { frequency: 2.0, points: 5.0, least: Some(90.0), greatest: Some(120.0) };
+    let outcome = run(&Method::plane(), &still, MeshOptions { size, ..options }).unwrap();
+    assert!(outcome.warnings().iter().any(|w| matches!(w, Warning::NoVelocity { count: 1, .. })));
+    assert_eq!((outcome.distance().least(), outcome.distance().greatest()), (90.0, 120.0));
 }
 
 #[test]

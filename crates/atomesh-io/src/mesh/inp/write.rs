@@ -3,7 +3,7 @@
 use std::collections::HashMap;
 use std::io::Write;
 
-use atomesh::mesh::Tags;
+use atomesh::mesh::{Regions, Tags};
 use atomesh::watch::{Phase, Watch, check};
 
 use super::super::behind::cell_behind;
@@ -11,6 +11,7 @@ use super::super::data::MeshData;
 use super::super::error::MeshWriteError;
 use super::super::metadata;
 use super::super::tags::plain_name;
+use super::sections::{Elastic, SectionKind, Sections};
 use super::{CELLS, face_number};
 
 /// Bytes gathered before they are handed on.
@@ -24,17 +25,6 @@ const WIDTH: usize = 20;
 
 /// The most letters of a line of comment; lines may have 256.
 const COMMENT: usize = 200;
-
-/// Abaqus' name for cells of so many points: triangles or tetrahedra, or those of second order, whose nodes it
-/// has in our order.
-fn element_type(node_count: usize) -> &'static str {
-    match node_count {
-        3 => "CPS3",
-        4 => "C3D4",
-        6 => "CPS6",
-        _ => "C3D10",
-    }
-}
 
 /// Writes a mesh as an Abaqus input file.
 ///
@@ -60,7 +50,9 @@ pub fn write_inp<const D: usize>(
         to.line(format_args!("{}, {x}, {y}, {z}", i + 1))?;
     }
     let each = data.nodes_per_cell();
-    to.line(format_args!("*ELEMENT, TYPE={}, ELSET={CELLS}", element_type(each)))?;
+    // nodes of cells of second order come in Abaqus' order
+    let kind = data.sections().map_or(SectionKind::PlaneStress, |sections| sections.kind);
+    to.line(format_args!("*ELEMENT, TYPE={}, ELSET={CELLS}", kind.element_type(each)))?;
     for (i, cell) in data.cell_nodes().chunks_exact(each).enumerate() {
         let nodes: Vec<String> = cell.iter().map(|node| (node + 1).to_string()).collect();
         to.line(format_args!("{}, {}", i + 1, nodes.join(", ")))?;
@@ -68,6 +60,9 @@ pub fn write_inp<const D: usize>(
     if let Some(tags) = data.tags() {
         regions(&mut to, tags)?;
         facet_groups(&mut to, data, tags)?;
+    }
+    if let Some(given) = data.sections() {
+        sections(&mut to, given, data.tags().and_then(Tags::regions))?;
     }
     to.flush()
 }
@@ -105,6 +100,32 @@ fn regions<W: Write, const D: usize>(
         to.line(format_args!("**region {id} {name}"))?;
         to.line(format_args!("*ELSET, ELSET={}", plain_name(&name)))?;
         to.list(&cells[&id])?;
+    }
+    Ok(())
+}
+
+/// A section for each region, or one for all cells, after the materials that are known: CalculiX wants them first.
+fn sections<W: Write>(
+    to: &mut Lines<W>,
+    sections: &Sections,
+    regions: Option<&Regions>,
+) -> Result<(), MeshWriteError> {
+    let all = || vec![(None, CELLS.to_owned())];
+    let parts = regions.map_or_else(all, |regions| {
+        let named = |id: i32| (Some(id), plain_name(&regions.name(id)));
+        regions.ids().into_iter().map(named).collect()
+    });
+    for (id, name) in &parts {
+        let of_part = |material: &&Elastic| id.is_none_or(|id| id == material.region);
+        let Some(material) = sections.materials.iter().rev().find(of_part) else { continue };
+        let [modulus, ratio] = [material.youngs_modulus, material.poissons_ratio].map(number);
+        to.line(format_args!("*MATERIAL, NAME={name}\n*ELASTIC\n{modulus}, {ratio}"))?;
+    }
+    for (_, name) in &parts {
+        to.line(format_args!("*SOLID SECTION, ELSET={name}, MATERIAL={name}"))?;
+        if matches!(sections.kind, SectionKind::PlaneStress | SectionKind::PlaneStrain) {
+            to.line(format_args!("1.0"))?; // the thickness
+        }
     }
     Ok(())
 }
