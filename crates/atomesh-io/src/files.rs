@@ -12,8 +12,9 @@ use atomesh::watch::Watch;
 use crate::atomic_file::AtomicFile;
 use crate::image::{WriteError, write_image};
 use crate::mesh::cells::{
-    CellData, ConnectionFiles, Flow, ModflowFiles, Rock, foam_mesh_of, write_cells_vtu,
-    write_cells_vtu_with, write_connections, write_connections_with_flow, write_modflow,
+    CellData, ConnectionFiles, Flow, ModflowFiles, Rock, SimulatorFiles, foam_mesh_of,
+    write_cells_vtu, write_cells_vtu_with, write_connections, write_connections_with_flow,
+    write_modflow, write_simulator,
 };
 use crate::mesh::openfoam::write_foam_mesh;
 use crate::mesh::vtu::write_broken_vtu;
@@ -21,7 +22,7 @@ use crate::mesh::{
     CellFields, FluxFiles, FluxTable, MeshData, MeshFormat, MeshWriteError, Streamlines,
     write_fluxes, write_mesh_as, write_streamlines,
 };
-use crate::surface::{SurfaceWriteError, write_surface};
+use crate::surface::{SurfaceExtras, SurfaceWriteError, write_surface};
 
 /// What a writer of meshes returns.
 type Written = Result<(), MeshWriteError>;
@@ -52,6 +53,8 @@ pub struct MeshFiles<const D: usize> {
         fn(&ConnectionFiles, &CellData<'_, D>, Flow<'_>, &mut dyn Watch) -> Written,
     /// [`write_modflow`].
     pub modflow: fn(&ModflowFiles, &CellData<'_, D>, &Rock<'_>, &mut dyn Watch) -> Written,
+    /// [`write_simulator`].
+    pub simulator: fn(&SimulatorFiles, &CellData<'_, D>, &Rock<'_>, &mut dyn Watch) -> Written,
     /// [`write_streamlines`].
     pub streamlines: fn(&Path, &Streamlines<'_, D>, &mut dyn Watch) -> Written,
     /// [`write_fluxes`].
@@ -60,12 +63,12 @@ pub struct MeshFiles<const D: usize> {
     pub surface: SurfaceWriter<D>,
 }
 
-/// Writes groups of facets, with a value for each.
+/// Writes groups of facets, with what else is known of them.
 type SurfaceWriter<const D: usize> = fn(
     &Path,
     &Mesh<D>,
     &[FacetGroup<D>],
-    Option<&[f32]>,
+    SurfaceExtras<'_>,
     &mut dyn Watch,
 ) -> Result<(), SurfaceWriteError>;
 
@@ -105,6 +108,7 @@ impl<const D: usize> MeshFiles<D> {
             connections: write_connections,
             connections_with_flow: write_connections_with_flow,
             modflow: write_modflow,
+            simulator: write_simulator,
             streamlines: write_streamlines,
             fluxes: write_fluxes,
             surface: write_surface,

@@ -4,7 +4,8 @@ use std::path::{Path, PathBuf};
 
 use atomesh_flow::{FlowError, Problem};
 use atomesh_io::mesh::cells::{
-    AnyCells, CellData, ConnectionFiles, Flow, LoadedCells, ModflowFiles, Rock, read_cells,
+    AnyCells, CellData, ConnectionFiles, Flow, LoadedCells, MOST_TOUGH_ELEMENTS, ModflowFiles,
+    Rock, Simulator, SimulatorFiles, read_cells,
 };
 use atomesh_io::output_group::OutputGroup;
 
@@ -14,7 +15,7 @@ use crate::files::{self, unknown_extension};
 use crate::mesh::staged_list;
 use crate::mesh_file;
 use crate::permeability;
-use crate::session::Session;
+use crate::session::{Note, NoteKind, Session};
 use crate::values::BarrierSpec;
 #[cfg(feature = "clap")]
 use crate::values::number_in;
@@ -26,7 +27,8 @@ pub struct ExportRequest {
     /// Voronoi cells that atomesh wrote: .vtu, or .json (a list of connections)
     #[cfg_attr(feature = "clap", arg(value_name = "CELLS"))]
     pub cells: PathBuf,
-    /// File to write: .json (connections), .disv (MODFLOW 6, polygons), .disu (MODFLOW 6, polyhedra)
+    /// File to write: .json (connections), .disv (MODFLOW 6, polygons), .disu (MODFLOW 6, polyhedra), .uge (PFLOTRAN,
+    /// explicit unstructured grid), .tough (TOUGH's file MESH), .opm (OPM's text of a grid)
     #[cfg_attr(feature = "clap", arg(short, long, value_name = "FILE"))]
     pub output: PathBuf,
     /// Permeability: a number above 0, or the name of a field of the cells
@@ -35,11 +37,11 @@ pub struct ExportRequest {
     /// Share of the flow that a feature lets through, 0 (sealed) to 1 (open). May be given many times
     #[cfg_attr(feature = "clap", arg(long, value_name = "NAME=M"))]
     pub barrier: Vec<BarrierSpec>,
-    /// Thickness of the layer of polygons (.disv)
+    /// Thickness of the layer of polygons
     #[cfg_attr(feature = "clap", arg(long, value_name = "LENGTH", default_value_t = Self::default().thickness,
         value_parser = number_in(f64::MIN_POSITIVE, f64::MAX, "a number above 0")))]
     pub thickness: f64,
-    /// Height of the layer's top (.disv)
+    /// Height of the layer's top
     #[cfg_attr(feature = "clap", arg(long, value_name = "HEIGHT", default_value_t = Self::default().top,
         allow_hyphen_values = true, value_parser = number_in(f64::MIN, f64::MAX, "a finite number")))]
     pub top: f64,
@@ -78,6 +80,7 @@ enum ExportFormat {
     Connections(ConnectionFiles),
     Disv(ModflowFiles),
     Disu(ModflowFiles),
+    Simulator(SimulatorFiles),
 }
 
 impl ExportFormat {
@@ -93,12 +96,20 @@ impl ExportFormat {
             }
             Some("disv") => Ok(Self::Disv(modflow())),
             Some("disu") => Ok(Self::Disu(modflow())),
-            _ => Err(unknown_extension(path, ".json (connections), .disv, .disu (MODFLOW 6)")),
+            // how many sides there are is known when the cells are
+            Some("uge") => Ok(Self::Simulator(SimulatorFiles::of(Simulator::Pflotran, path, 3))),
+            Some("tough") => Ok(Self::Simulator(SimulatorFiles::of(Simulator::Tough, path, 3))),
+            Some("opm") => Ok(Self::Simulator(SimulatorFiles::of(Simulator::Opm, path, 3))),
+            _ => {
+                let known =
+                    ".json (connections), .disv, .disu (MODFLOW 6), .uge (PFLOTRAN), .tough, .opm";
+                Err(unknown_extension(path, known))
+            }
         }
     }
 
-    /// The same files, written to where the group says.
-    fn staged(&self, group: &mut OutputGroup) -> Result<Self, JobError> {
+    /// The same files of cells of so many axes, written to where the group says.
+    fn staged(&self, dimension: usize, group: &mut OutputGroup) -> Result<Self, JobError> {
         let mut modflow = |files: &ModflowFiles| {
             Ok(ModflowFiles {
                 grid: files::stage(&files.grid, group)?,
@@ -110,6 +121,13 @@ impl ExportFormat {
             Self::Connections(files) => Ok(Self::Connections(staged_list(files, group)?)),
             Self::Disv(files) => modflow(files).map(Self::Disv),
             Self::Disu(files) => modflow(files).map(Self::Disu),
+            Self::Simulator(files) => Ok(Self::Simulator(SimulatorFiles {
+                simulator: files.simulator,
+                grid: files::stage(&files.grid, group)?,
+                sides: (files.sides.iter().take(2 * dimension))
+                    .map(|side| files::stage(side, group))
+                    .collect::<Result<_, _>>()?,
+            })),
         }
     }
 
@@ -117,6 +135,7 @@ impl ExportFormat {
         match self {
             Self::Connections(files) => files.paths().to_vec(),
             Self::Disv(files) | Self::Disu(files) => files.paths(),
+            Self::Simulator(files) => files.paths(),
         }
     }
 }
@@ -170,6 +189,48 @@ impl<const D: usize> Export<'_, D> {
         }
     }
 
+    /// Refuses what a simulator's files do not hold, and says what they leave out.
+    fn check_simulator(
+        &self,
+        multipliers: &[f64],
+        session: &mut Session<'_>,
+    ) -> Result<(), JobError> {
+        let ExportFormat::Simulator(SimulatorFiles { simulator, .. }) = self.format else {
+            return Ok(());
+        };
+        let output = &self.request.output;
+        let say = |text: &str, session: &mut Session<'_>| {
+            let file = Some(output.clone());
+            session.note(Note { kind: NoteKind::Change, file, text: text.into() });
+        };
+        match simulator {
+            Simulator::Tough => {
+                let count = self.cells.mesh.cell_count();
+                if count > MOST_TOUGH_ELEMENTS {
+                    let message = format!(
+                        "{count} cells; names of five characters tell {MOST_TOUGH_ELEMENTS} apart"
+                    );
+                    return Err(JobError::content(message).about(output));
+                }
+                say(
+                    "TOUGH's columns hold numbers of ten characters; coordinates and areas are rounded to them",
+                    session,
+                );
+            }
+            Simulator::Opm => {
+                if multipliers.iter().any(|m| *m > 0.0 && *m < 1.0) {
+                    let message = "OPM's grids hold no shares of flow; expected barriers of 0 or 1";
+                    return Err(JobError::misuse(message).about(output));
+                }
+                say("OPM's grids hold geometry; permeability is not written", session);
+            }
+            Simulator::Pflotran => {
+                say("PFLOTRAN's grids hold geometry; permeability is not written", session);
+            }
+        }
+        Ok(())
+    }
+
     fn write(
         &self,
         dimension: &Dimension<D>,
@@ -183,10 +244,11 @@ impl<const D: usize> Export<'_, D> {
         let problem = Problem { permeability, barriers, ..Problem::default() };
         let about = |e: FlowError| JobError::from(e).about(&self.request.cells);
         let setting = (method.setting)(&problem, &grid).map_err(about)?;
-        if !matches!(self.format, ExportFormat::Connections(_)) {
+        if matches!(self.format, ExportFormat::Disv(_) | ExportFormat::Disu(_)) {
             self.warn_of_compartments(setting.compartments().len(), session);
         }
         let multipliers = setting.multipliers();
+        self.check_simulator(multipliers, session)?;
         let found = (method.transmissibilities)(mesh, setting.permeability(), multipliers);
         let found = found.map_err(about)?;
         let k: Vec<f64> = (0..mesh.cell_count())
@@ -194,7 +256,7 @@ impl<const D: usize> Export<'_, D> {
             .collect();
         let data = CellData { mesh, features, frame, provenance };
         session.write_together(|group, session| {
-            let written = match self.format.staged(group)? {
+            let written = match self.format.staged(D, group)? {
                 ExportFormat::Connections(files) => {
                     let flow = Flow { permeability: &k, transmissibilities: &found };
                     (dimension.files.connections_with_flow)(&files, &data, flow, session)
@@ -203,6 +265,11 @@ impl<const D: usize> Export<'_, D> {
                     let (top, thickness) = (self.request.top, self.request.thickness);
                     let rock = Rock { permeability: &k, multipliers, top, thickness };
                     (dimension.files.modflow)(&files, &data, &rock, session)
+                }
+                ExportFormat::Simulator(files) => {
+                    let (top, thickness) = (self.request.top, self.request.thickness);
+                    let rock = Rock { permeability: &k, multipliers, top, thickness };
+                    (dimension.files.simulator)(&files, &data, &rock, session)
                 }
             };
             written.map_err(|e| JobError::from(e).about(&self.request.output))

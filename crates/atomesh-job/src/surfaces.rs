@@ -5,14 +5,18 @@ use std::path::{Path, PathBuf};
 use atomesh::features::FeatureFaces;
 use atomesh::mesh::{FacetGroup, Mesh, PolyMesh, Regions, Tags, feature_name, side_name};
 use atomesh::region::closed_surface;
-use atomesh_io::mesh::LoadedMesh;
 use atomesh_io::mesh::cells::LoadedCells;
+use atomesh_io::mesh::{LoadedMesh, Provenance};
+use atomesh_io::surface::{SurfaceExtras, WorldAxes};
+use serde::Deserialize;
 
 use crate::dimension::Dimension;
 use crate::error::JobError;
 use crate::files::{self, surface_format};
 use crate::mesh_file::{self, MeshFile};
 use crate::session::Session;
+#[cfg(feature = "clap")]
+use crate::values::named;
 
 /// The most names that a refusal lists.
 const MOST_NAMED: usize = 8;
@@ -36,6 +40,37 @@ pub struct SurfacesRequest {
     /// be given many times
     #[cfg_attr(feature = "clap", arg(long, value_name = "LABEL", allow_hyphen_values = true))]
     pub region: Vec<String>,
+    /// Where z grows, for GOCAD: down (depth) or up (elevation). Default: down of seismic data whose third axis is time
+    /// or depth, else up
+    #[cfg_attr(feature = "clap", arg(long, value_name = "WHERE",
+        value_parser = named::<ZPositive>(&["depth", "elevation"])))]
+    pub z_positive: Option<ZPositive>,
+}
+
+/// Where z grows.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Deserialize)]
+#[serde(rename_all = "lowercase")]
+pub enum ZPositive {
+    /// Downwards.
+    Depth,
+    /// Upwards.
+    Elevation,
+}
+
+/// The axes of the world of a mesh, as far as they are known: z grows as is asked for, or else downwards where it is
+/// time, or was read as that or depth.
+pub(crate) fn world_axes(wish: Option<ZPositive>, made_by: Option<&Provenance>) -> WorldAxes {
+    let units = made_by.map(|made| made.units.clone()).unwrap_or_default();
+    let is_time = units.get(2).is_some_and(|unit| ["ms", "s"].contains(&unit.as_str()));
+    let is_vertical = || {
+        let options = &made_by?.options;
+        options.get("frame")?.get("vertical")?.as_str().map(drop)
+    };
+    let z_down = match wish {
+        Some(wish) => wish == ZPositive::Depth,
+        None => is_time || is_vertical().is_some(),
+    };
+    WorldAxes { units, z_down }
 }
 
 /// What became of [`surfaces_file`].
@@ -157,21 +192,25 @@ pub fn surfaces_file(
     match mesh_file::read(&request.mesh, session)? {
         MeshFile::Flat(loaded) => {
             let groups = surfaces(request, &loaded).map_err(about)?;
-            write(request, &loaded.mesh, &groups, &Dimension::plane(), session)
+            let axes = world_axes(request.z_positive, loaded.provenance.as_ref());
+            write(request, (&loaded.mesh, &groups, &axes), &Dimension::plane(), session)
         }
         MeshFile::Volume(loaded) => {
             let groups = surfaces(request, &loaded).map_err(about)?;
-            write(request, &loaded.mesh, &groups, &Dimension::space(), session)
+            let axes = world_axes(request.z_positive, loaded.provenance.as_ref());
+            write(request, (&loaded.mesh, &groups, &axes), &Dimension::space(), session)
         }
         MeshFile::Polygons(loaded) => {
             let groups = surfaces_of_cells(request, &loaded).map_err(about)?;
             let points = points_of(&loaded.mesh).map_err(about)?;
-            write(request, &points, &groups, &Dimension::plane(), session)
+            let axes = world_axes(request.z_positive, Some(&loaded.provenance));
+            write(request, (&points, &groups, &axes), &Dimension::plane(), session)
         }
         MeshFile::Polyhedra(loaded) => {
             let groups = surfaces_of_cells(request, &loaded).map_err(about)?;
             let points = points_of(&loaded.mesh).map_err(about)?;
-            write(request, &points, &groups, &Dimension::space(), session)
+            let axes = world_axes(request.z_positive, Some(&loaded.provenance));
+            write(request, (&points, &groups, &axes), &Dimension::space(), session)
         }
     }
 }
@@ -233,24 +272,22 @@ pub(crate) fn points_of<const D: usize>(cells: &PolyMesh<D>) -> Result<Mesh<D>, 
 
 fn write<const D: usize>(
     request: &SurfacesRequest,
-    mesh: &Mesh<D>,
-    groups: &[FacetGroup<D>],
+    (mesh, groups, axes): (&Mesh<D>, &[FacetGroup<D>], &WorldAxes),
     dimension: &Dimension<D>,
     session: &mut Session<'_>,
 ) -> Result<SurfacesSummary, JobError> {
-    write_groups(&request.output, mesh, groups, dimension, session)?;
+    write_groups(&request.output, (mesh, groups, Some(axes)), dimension, session)?;
     let facets = groups.iter().map(|group| group.facets.len()).sum();
     Ok(SurfacesSummary { groups: groups.len(), facets })
 }
 
-/// Writes groups of facets as a file of surfaces.
+/// Writes groups of facets of a mesh as a file of surfaces, in a world of these axes.
 ///
 /// # Errors
 /// [`JobError`] if the file's format is unknown or for another dimension, or it cannot be written.
 pub fn write_groups<const D: usize>(
     output: &Path,
-    mesh: &Mesh<D>,
-    groups: &[FacetGroup<D>],
+    (mesh, groups, axes): (&Mesh<D>, &[FacetGroup<D>], Option<&WorldAxes>),
     dimension: &Dimension<D>,
     session: &mut Session<'_>,
 ) -> Result<(), JobError> {
@@ -259,7 +296,8 @@ pub fn write_groups<const D: usize>(
     let write = dimension.files.surface;
     session.write_together(|group, session| {
         let path = files::stage(output, group)?;
-        let written = write(&path, mesh, groups, None, session);
+        let extras = SurfaceExtras { values: None, axes };
+        let written = write(&path, mesh, groups, extras, session);
         written.map_err(|e| JobError::from(e).about(output))
     })
 }

@@ -134,5 +134,5 @@ fn written<const D: usize>(
     let facets = parts.corners.as_chunks::<D>().0.to_vec();
     let mesh = Mesh::new(points, Vec::new()).map_err(JobError::content)?;
     let groups = [FacetGroup { id: 1, name, facets }];
-    atomesh_job::surfaces::write_groups(path, &mesh, &groups, dimension, session)
+    atomesh_job::surfaces::write_groups(path, (&mesh, &groups, None), dimension, session)
 }

@@ -55,13 +55,20 @@ impl Input {
         found
     }
 
-    /// The job: displacements on the sides, what comes out of all nodes and elements.
-    fn job(&self, dimension: usize) -> String {
+    /// The job: displacements on the sides, what comes out of all nodes and elements; one section unless the mesh has its
+    /// own.
+    fn job(&self, dimension: usize, has_sections: bool) -> String {
         let (young, poisson) = ELASTIC;
+        let section = match has_sections {
+            true => String::new(),
+            false => format!(
+                "*MATERIAL, NAME=rock\n*ELASTIC\n{young}, {poisson}\n\
+                 *SOLID SECTION, ELSET=cells, MATERIAL=rock\n"
+            ),
+        };
         let mut text = format!(
             "*INCLUDE, INPUT=mesh.inp\n*NSET, NSET=every, GENERATE\n1, {}, 1\n\
-             *MATERIAL, NAME=rock\n*ELASTIC\n{young}, {poisson}\n\
-             *SOLID SECTION, ELSET=cells, MATERIAL=rock\n*STEP\n*STATIC\n*BOUNDARY\n",
+             {section}*STEP\n*STATIC\n*BOUNDARY\n",
             self.nodes.len()
         );
         for &node in &self.on_sides {
@@ -83,14 +90,15 @@ fn displacement(place: &[f64; 3], dimension: usize) -> [f64; 3] {
     })
 }
 
-/// xx, yy, zz, xy, xz, yz; in the plane for no stress across it.
-fn stress(dimension: usize) -> [f64; 6] {
+/// xx, yy, zz, xy, xz, yz; in the plane for no stress across it, or no strain.
+fn stress(dimension: usize, no_strain: bool) -> [f64; 6] {
     let (young, poisson) = ELASTIC;
     let shear = young / (2.0 * (1.0 + poisson));
     let strain = |i: usize, j: usize| 0.5 * (GRADIENT[i][j] + GRADIENT[j][i]);
     let mut normal = [strain(0, 0), strain(1, 1), strain(2, 2)];
     if dimension == 2 {
-        normal[2] = -poisson / (1.0 - poisson) * (normal[0] + normal[1]);
+        let free = -poisson / (1.0 - poisson) * (normal[0] + normal[1]);
+        normal[2] = if no_strain { 0.0 } else { free };
     }
     let lame = young * poisson / ((1.0 + poisson) * (1.0 - 2.0 * poisson));
     let pressure = lame * normal.iter().sum::<f64>();
@@ -119,16 +127,17 @@ fn greatest(values: impl Iterator<Item = f64>) -> f64 {
     values.fold(0.0, |most, value| most.max(value.abs()))
 }
 
-fn patch_test(dimension: usize, image: &str, order: usize) {
+/// The test of a mesh with these options besides; those that name a section leave the job none to give.
+fn patch_test(dimension: usize, image: &str, order: usize, options: &str) {
     let folder = tempfile::tempdir().unwrap();
     let folder = folder.path();
     succeed(folder, &format!("synth {image} -q"));
     let image = image.rsplit(' ').next().unwrap();
-    succeed(folder, &format!("mesh {image} -o mesh.inp --features edges --order {order} -q"));
+    succeed(folder, &format!("mesh {image} -o mesh.inp --order {order} -q {options}"));
     let sides = ["xmin", "xmax", "ymin", "ymax", "zmin", "zmax"];
     let input = Input::read(&folder.join("mesh.inp"), &sides[..2 * dimension]);
     assert!(input.on_sides.len() < input.nodes.len(), "all nodes are given");
-    fs::write(folder.join("job.inp"), input.job(dimension)).unwrap();
+    fs::write(folder.join("job.inp"), input.job(dimension, options.contains("--section"))).unwrap();
     let output = Command::new("ccx").current_dir(folder).args(["-i", "job"]).output().unwrap();
     let said = String::from_utf8_lossy(&output.stdout);
     let dat = fs::read_to_string(folder.join("job.dat")).unwrap_or_else(|e| panic!("{e}: {said}"));
@@ -143,7 +152,7 @@ fn patch_test(dimension: usize, image: &str, order: usize) {
         let own = &expected[node - 1][..dimension];
         assert_near(&row[1..=dimension], own, scale, &format!("order {order}, node {node}"));
     }
-    let expected = stress(dimension);
+    let expected = stress(dimension, options.contains("plane-strain"));
     let stresses = rows(&dat, "stresses");
     assert!(stresses.len() >= input.element_count, "{} stresses", stresses.len());
     let scale = greatest(expected.into_iter());
@@ -166,7 +175,7 @@ fn is_installed() -> bool {
 fn calculix_gives_linear_displacements_and_one_stress_in_the_plane() {
     for order in [1, 2] {
         if is_installed() {
-            patch_test(2, "disc --shape 60,44 -o disc.png", order);
+            patch_test(2, "disc --shape 60,44 -o disc.png", order, "--features edges");
         }
     }
 }
@@ -175,7 +184,24 @@ fn calculix_gives_linear_displacements_and_one_stress_in_the_plane() {
 fn calculix_gives_linear_displacements_and_one_stress_in_space() {
     for order in [1, 2] {
         if is_installed() {
-            patch_test(3, "sphere --shape 20,16,18 -o ball.npy", order);
+            patch_test(3, "sphere --shape 20,16,18 -o ball.npy", order, "--features edges");
         }
+    }
+}
+
+/// Each element has a section, of the kind that was asked for, and constants of its region: which are the same here, so that
+/// the answer is known.
+#[test]
+fn calculix_takes_sections_and_materials_of_phases() {
+    let constants = "--material 0=1000,0.3 --material 1=1000,0.3";
+    for kind in ["plane-strain", "plane-stress"] {
+        if is_installed() {
+            let options = format!("--threshold 128 --y-up --section {kind} {constants}");
+            patch_test(2, "disc --shape 60,44 -o disc.png", 2, &options);
+        }
+    }
+    if is_installed() {
+        let options = format!("--threshold 128 --section solid {constants}");
+        patch_test(3, "sphere --shape 20,16,18 --bytes -o ball.npy", 1, &options);
     }
 }

@@ -130,11 +130,30 @@ pub enum SurfaceWriteError {
     Cancelled(#[from] Cancelled),
 }
 
+/// What is known of a surface beside its facets.
+#[derive(Clone, Copy, Debug, Default)]
+pub struct SurfaceExtras<'a> {
+    /// One for each group, such as the mean of b; VTP alone holds them, as the cell array `potential`.
+    pub values: Option<&'a [f32]>,
+    /// The world's axes; GOCAD alone holds them.
+    pub axes: Option<&'a WorldAxes>,
+}
+
+/// What the world's axes are.
+#[derive(Clone, Debug, Default, PartialEq, Eq)]
+pub struct WorldAxes {
+    /// Their units, such as `m` or `ms`; those missing are not known.
+    pub units: Vec<String>,
+    /// Whether z grows downwards, as depth and time do.
+    pub z_down: bool,
+}
+
 /// Groups of facets with the points that they name.
 struct Surface<'a, const D: usize> {
     /// The points in use, in the mesh's order; z is 0 in flat meshes.
     points: Vec<[f64; 3]>,
     groups: Vec<Group<'a, D>>,
+    axes: Option<&'a WorldAxes>,
 }
 
 /// A group with its corners renumbered to the points in use.
@@ -150,7 +169,7 @@ impl<'a, const D: usize> Surface<'a, D> {
     fn new(
         mesh: &Mesh<D>,
         groups: &'a [FacetGroup<D>],
-        values: Option<&[f32]>,
+        SurfaceExtras { values, axes }: SurfaceExtras<'a>,
     ) -> Result<Self, SurfaceWriteError> {
         let count = mesh.points().len();
         let mut number = BTreeMap::new();
@@ -183,7 +202,7 @@ impl<'a, const D: usize> Surface<'a, D> {
             facets: group.facets.iter().map(|facet| facet.map(|c| number[&c])).collect(),
             value: values.and_then(|values| values.get(at).copied()),
         });
-        Ok(Self { groups: groups.collect(), points })
+        Ok(Self { groups: groups.collect(), points, axes })
     }
 
     fn facet_count(&self) -> usize {
@@ -197,8 +216,7 @@ impl<'a, const D: usize> Surface<'a, D> {
 }
 
 /// Writes groups of facets of a mesh in the format that the name calls for; the file appears whole or not at
-/// all. `values` are one for each group, such as the mean of b; VTP alone holds them, as the cell array
-/// `potential`.
+/// all.
 ///
 /// # Errors
 /// [`SurfaceWriteError`] if the format is unknown or cannot hold facets of this dimension, a facet names a
@@ -207,12 +225,12 @@ pub fn write_surface<const D: usize>(
     path: &Path,
     mesh: &Mesh<D>,
     groups: &[FacetGroup<D>],
-    values: Option<&[f32]>,
+    extras: SurfaceExtras<'_>,
     watch: &mut dyn Watch,
 ) -> Result<(), SurfaceWriteError> {
     let format = SurfaceFormat::of(path)?;
     format.check_dimension(D)?;
-    let surface = Surface::new(mesh, groups, values)?;
+    let surface = Surface::new(mesh, groups, extras)?;
     check(watch, Phase::Write, 0.0, None)?;
     let mut file = AtomicFile::create(path)?;
     match format {

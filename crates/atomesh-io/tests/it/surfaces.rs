@@ -3,7 +3,7 @@
 use atomesh::geometry::Bounds;
 use atomesh::mesh::{FacetGroup, Mesh, Tags};
 use atomesh::watch::Silent;
-use atomesh_io::surface::{LoadedSurface, read_surface, write_surface};
+use atomesh_io::surface::{LoadedSurface, SurfaceExtras, WorldAxes, read_surface, write_surface};
 
 /// Two tetrahedra on a triangle, with its facet and the hull as groups, and a point of neither.
 fn solid() -> (Mesh<3>, Vec<FacetGroup<3>>) {
@@ -64,7 +64,7 @@ fn triangles_are_read_as_they_were_written() {
     let (mesh, groups) = solid();
     for name in ["a.vtp", "a.obj", "a.ply", "a.ts", "a.STL"] {
         let path = folder.path().join(name);
-        write_surface(&path, &mesh, &groups, None, &mut Silent).unwrap();
+        write_surface(&path, &mesh, &groups, SurfaceExtras::default(), &mut Silent).unwrap();
         let read = read_surface(&path).unwrap_or_else(|e| panic!("{name}: {e}"));
         let mut expected = expected(&mesh, &groups);
         if name == "a.STL" {
@@ -88,7 +88,7 @@ fn lines_are_read_as_they_were_written() {
     let (mesh, groups) = flat();
     for name in ["a.vtp", "a.obj", "a.ply", "a.pl"] {
         let path = folder.path().join(name);
-        write_surface(&path, &mesh, &groups, None, &mut Silent).unwrap();
+        write_surface(&path, &mesh, &groups, SurfaceExtras::default(), &mut Silent).unwrap();
         let read = read_surface(&path).unwrap_or_else(|e| panic!("{name}: {e}"));
         assert_eq!(shapes(&read), expected(&mesh, &groups), "{name}");
     }
@@ -100,7 +100,8 @@ fn formats_refuse_what_they_cannot_hold_and_leave_no_file() {
     let (mesh, groups) = flat();
     let refused = |name: &str| {
         let path = folder.path().join(name);
-        let error = write_surface(&path, &mesh, &groups, None, &mut Silent).unwrap_err();
+        let error = write_surface(&path, &mesh, &groups, SurfaceExtras::default(), &mut Silent)
+            .unwrap_err();
         assert!(!path.exists(), "{name}");
         error.to_string()
     };
@@ -109,10 +110,22 @@ fn formats_refuse_what_they_cannot_hold_and_leave_no_file() {
     assert_eq!(refused("a.ts"), format!("GOCAD TSurf {advice}"));
     assert!(refused("a.vtu").contains("is not a surface file by its name; expected one of .vtp"));
     let (mesh, groups) = solid();
-    let error = write_surface(&folder.path().join("a.pl"), &mesh, &groups, None, &mut Silent);
+    let error = write_surface(
+        &folder.path().join("a.pl"),
+        &mesh,
+        &groups,
+        SurfaceExtras::default(),
+        &mut Silent,
+    );
     assert!(error.unwrap_err().to_string().starts_with("GOCAD PLine cannot hold triangles"));
     let odd = [FacetGroup { id: 1, name: "odd".into(), facets: vec![[1, 2, 7]] }];
-    let error = write_surface(&folder.path().join("a.obj"), &mesh, &odd, None, &mut Silent);
+    let error = write_surface(
+        &folder.path().join("a.obj"),
+        &mesh,
+        &odd,
+        SurfaceExtras::default(),
+        &mut Silent,
+    );
     assert_eq!(error.unwrap_err().to_string(), "a facet of \"odd\" names point 7; the mesh has 6");
 }
 
@@ -138,7 +151,8 @@ fn a_vtp_names_its_arrays_and_is_the_same_again() {
     let (mesh, groups) = solid();
     let write = |name: &str| {
         let path = folder.path().join(name);
-        write_surface(&path, &mesh, &groups, Some(&[-0.5, -0.25]), &mut Silent).unwrap();
+        let extras = SurfaceExtras { values: Some(&[-0.5, -0.25]), axes: None };
+        write_surface(&path, &mesh, &groups, extras, &mut Silent).unwrap();
         std::fs::read(path).unwrap()
     };
     let bytes = write("a.vtp");
@@ -158,5 +172,28 @@ fn a_vtp_names_its_arrays_and_is_the_same_again() {
     let none = Tags::sides(&mesh, &bounds, 0.0);
     // no facet lies on the box: groups without facets make a file without points
     let path = folder.path().join("none.vtp");
-    write_surface(&path, &mesh, &none.facet_groups()[..1], None, &mut Silent).unwrap();
+    write_surface(&path, &mesh, &none.facet_groups()[..1], SurfaceExtras::default(), &mut Silent)
+        .unwrap();
+}
+
+#[test]
+fn gocad_is_told_units_and_where_z_grows() {
+    let (folder, (mesh, groups)) = (tempfile::tempdir().unwrap(), solid());
+    let path = folder.path().join("a.ts");
+    let text = |axes: Option<&WorldAxes>| {
+        let extras = SurfaceExtras { values: None, axes };
+        write_surface(&path, &mesh, &groups, extras, &mut Silent).unwrap();
+        std::fs::read_to_string(&path).unwrap()
+    };
+    assert!(!text(None).contains("ZPOSITIVE"));
+    let mut axes = WorldAxes { units: vec!["m".into(), "m".into(), "ms".into()], z_down: true };
+    let found = text(Some(&axes));
+    // each object has a system of its own, before its part
+    assert_eq!(found.matches("ZPOSITIVE Depth\n").count(), groups.len());
+    assert_eq!(found.matches("AXIS_UNIT \"m\" \"m\" \"ms\"\n").count(), groups.len());
+    assert!(found.find("END_ORIGINAL_COORDINATE_SYSTEM\n") < found.find("TFACE"));
+    axes = WorldAxes::default();
+    let found = text(Some(&axes));
+    assert!(found.contains("ZPOSITIVE Elevation") && found.contains("AXIS_UNIT \"none\""));
+    assert_eq!(read_surface(&path).unwrap().triangles.len(), 3);
 }

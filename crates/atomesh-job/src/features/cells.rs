@@ -12,6 +12,7 @@ use atomesh::mesh::{PolyMesh, feature_name};
 use atomesh_io::mesh::CellFields;
 use atomesh_io::mesh::cells::{CellData, LoadedCells};
 use atomesh_io::output_group::OutputGroup;
+use atomesh_io::surface::SurfaceExtras;
 use serde_json::{Value, json};
 
 use super::write::FeatureFiles;
@@ -21,7 +22,7 @@ use crate::error::JobError;
 use crate::files::{self, has_extension, write_bytes};
 use crate::images::{Beside, ImageRole};
 use crate::session::{Note, NoteKind, Session};
-use crate::surfaces::{feature_groups, points_of};
+use crate::surfaces::{feature_groups, points_of, world_axes};
 
 /// Finds features of cells, and writes them.
 ///
@@ -224,8 +225,10 @@ impl<const D: usize> Writing<'_, D> {
                 .map(|n| self.found.mean(n, cells).map(|mean| mean as f32))
                 .collect();
             let points = points_of(cells)?;
+            let axes = world_axes(request.z_positive, Some(&self.loaded.provenance));
+            let extras = SurfaceExtras { values: means.as_deref(), axes: Some(&axes) };
             let write = self.dimension.files.surface;
-            let written = write(path, &points, &groups, means.as_deref(), session);
+            let written = write(path, &points, &groups, extras, session);
             written.map_err(|e| JobError::from(e).about(path))?;
         }
         if let Some(path) = &files::stage_any(&request.mesh_output, group)? {

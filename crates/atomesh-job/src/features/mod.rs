@@ -21,6 +21,7 @@ use crate::images::{Beside, ImageRole};
 use crate::mesh_file::{self, MeshFile};
 use crate::options::{FrameOptions, PotentialOptions, RunConfig};
 use crate::session::Session;
+use crate::surfaces::ZPositive;
 #[cfg(feature = "clap")]
 use crate::values::{named, number_in};
 pub use cells::{FeaturesOfCells, features_of_cells};
@@ -44,6 +45,11 @@ pub struct FeaturesRequest {
     /// Surfaces to write: .vtp .obj .ply; in 3-D also .stl and .ts (GOCAD), in 2-D .pl (GOCAD)
     #[cfg_attr(feature = "clap", arg(short, long, value_name = "SURFACE"))]
     pub output: Option<PathBuf>,
+    /// Where z grows, for GOCAD: down (depth) or up (elevation). Default: down of seismic data whose third axis is time
+    /// or depth, else up
+    #[cfg_attr(feature = "clap", arg(long, value_name = "WHERE",
+        value_parser = named::<ZPositive>(&["depth", "elevation"])))]
+    pub z_positive: Option<ZPositive>,
     /// Mesh to write with the features and the sides of the box as tagged facets: .vtu .msh .msh2 .inp, or
     /// a folder named polyMesh; Voronoi cells: .vtu
     #[cfg_attr(feature = "clap", arg(long, value_name = "MESH"))]
@@ -102,6 +108,7 @@ impl Default for FeaturesRequest {
             image: None,
             potential: None,
             output: None,
+            z_positive: None,
             mesh_output: None,
             regions: false,
             least_island: 0,

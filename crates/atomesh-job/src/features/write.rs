@@ -7,7 +7,7 @@ use atomesh::mesh::{Tags, is_feature_name};
 use atomesh::run::Tools;
 use atomesh_io::mesh::{LoadedMesh, MeshData, MeshFormat};
 use atomesh_io::output_group::OutputGroup;
-use atomesh_io::surface::SurfaceFormat;
+use atomesh_io::surface::{SurfaceExtras, SurfaceFormat};
 use serde_json::json;
 
 use super::FeaturesRequest;
@@ -16,6 +16,7 @@ use crate::error::JobError;
 use crate::files::{self, surface_format, write_bytes};
 use crate::mesh_file;
 use crate::session::{Note, NoteKind, Session};
+use crate::surfaces::world_axes;
 
 /// Features of a mesh, to be written.
 struct Found<'a, const D: usize> {
@@ -96,8 +97,10 @@ impl<'a> FeatureFiles<'a> {
         if let Some((path, _)) = self.surface {
             let path = &files::stage(path, group)?;
             let means: Vec<f32> = found.features.iter().map(|f| f.mean as f32).collect();
-            let known = means.iter().all(|mean| mean.is_finite()).then_some(&means[..]);
-            let written = (dimension.files.surface)(path, mesh, &found.groups(), known, session);
+            let axes = world_axes(self.request.z_positive, loaded.provenance.as_ref());
+            let values = means.iter().all(|mean| mean.is_finite()).then_some(&means[..]);
+            let extras = SurfaceExtras { values, axes: Some(&axes) };
+            let written = (dimension.files.surface)(path, mesh, &found.groups(), extras, session);
             written.map_err(|e| JobError::from(e).about(path))?;
         }
         if let (Some(path), Some(named)) =

@@ -51,7 +51,7 @@ pub(super) fn by_thresholds<const D: usize>(
             range.min,
             range.max
         );
-        return Err(JobError::content(message));
+        return Err(JobError::content(message).about_any(run.input.shown()));
     }
     let labels = image.clone().with_samples(Samples::U8(labels.into()));
     labels.map(Some).map_err(JobError::content)

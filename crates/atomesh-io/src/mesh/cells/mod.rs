@@ -1,4 +1,4 @@
-//! Files of polygons and polyhedra: VTU, OpenFOAM's polyMesh, lists of connections, and MODFLOW's grids.
+//! Files of polygons and polyhedra: VTU, OpenFOAM's polyMesh, lists of connections, and grids of MODFLOW, PFLOTRAN, TOUGH and OPM.
 //!
 //! All hold world coordinates, and name cells, faces and points from 0 on in the mesh's order, so that a cell of
 //! one file is the cell of that number in the others. Polyhedra of a VTU file stand in another order; its array `cell`
@@ -10,6 +10,7 @@ mod modflow;
 mod raw;
 mod read;
 mod read_vtu;
+mod simulators;
 mod table;
 mod topology;
 mod vtu;
@@ -19,6 +20,7 @@ pub use foam::foam_mesh_of;
 pub use modflow::{ModflowFiles, Rock, write_modflow};
 pub use raw::CellReadError;
 pub use read::{AnyCells, LoadedCells, read_cells};
+pub use simulators::{MOST_TOUGH_ELEMENTS, Simulator, SimulatorFiles, write_simulator};
 pub use vtu::{write_cells_vtu, write_cells_vtu_with};
 
 use atomesh::features::FeatureFaces;
