@@ -12,5 +12,6 @@ mod mesh_files;
 mod quadratic_files;
 mod real_images;
 mod scans;
+mod simulators;
 mod surfaces;
 mod tags;
