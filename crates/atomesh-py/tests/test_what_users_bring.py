@@ -16,7 +16,7 @@ def test_an_array_of_an_archive_is_chosen_by_its_name(tmp_path: Path) -> None:
     np.savez(path, ct=VOLUME, label=VOLUME % 3)
     with pytest.raises(am.InputError, match=r"ct \(7, 6, 5\), label \(7, 6, 5\)"):
         am.read(path)
-    np.testing.assert_array_equal(am.read(path, array="label").values, VOLUME % 3)
+    np.testing.assert_array_equal(am.read(path, array="label").array, VOLUME % 3)
     with pytest.raises(am.InputError, match="not \"x\""):
         am.read(path, array="x")
 
@@ -27,7 +27,7 @@ def test_slices_of_a_folder_are_in_the_order_of_their_numbers(tmp_path: Path) ->
     with warnings.catch_warnings(record=True):
         warnings.simplefilter("always")
         image = am.read(tmp_path, spacing=(0.5, 0.5, 2.0))
-    np.testing.assert_array_equal(image.values, VOLUME)
+    np.testing.assert_array_equal(image.array, VOLUME)
     assert tuple(image.spacing) == (0.5, 0.5, 2.0)
 
 

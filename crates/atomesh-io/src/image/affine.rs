@@ -184,6 +184,7 @@ fn slice_axes(shape: &[usize]) -> Option<[usize; 2]> {
     let long: Vec<usize> = (0..shape.len()).filter(|&axis| shape[axis] > 1).collect();
     match (shape.len(), &long[..]) {
         (2, _) => Some([0, 1]),
+        (3, _) if shape[2] == 1 => Some([0, 1]),
         (3, &[first, second]) => Some([first, second]),
         _ => None,
     }
@@ -201,6 +202,8 @@ fn slice(affine: &Affine, kept: [usize; 2]) -> (Affine, Option<ReadNote>) {
         // the slice's own plane, x along its first axis
         let length = dot(&x, &x).sqrt();
         let along = dot(&x, &y) / length;
+        // what rounding leaves of a right angle
+        let along = if along.abs() < 1e-12 * size { 0.0 } else { along };
         let across = (dot(&y, &y) - along * along).max(0.0).sqrt();
         [[length, 0.0, 0.0], [along, across, 0.0], [0.0, 0.0, 1.0]]
     };
@@ -378,8 +381,8 @@ mod tests {
         );
         let axes = [[1.0, 0.0, 0.0], [0.0, 0.0, 1.0]];
         assert_eq!(upright.notes, [ReadNote::ObliqueSlice { origin: affine.origin, axes }]);
-        // a row is no slice, and a slice has to have vectors
-        assert_eq!(placed(FORMAT, &[6, 1, 1], affine, samples).unwrap().image.shape(), [6, 1, 1]);
+        // a row along z is no slice, and a slice has to have vectors
+        assert_eq!(placed(FORMAT, &[1, 1, 6], affine, samples).unwrap().image.shape(), [1, 1, 6]);
         affine.matrix[2][2] = 0.0;
         assert!(placed(FORMAT, &[2, 1, 3], affine, samples).is_err());
         affine.matrix[0][2] = f64::NAN;

@@ -4,9 +4,12 @@
 //! Definition: <https://surfer.nmr.mgh.harvard.edu/fswiki/FsTutorial/MghFormat>. The header states spacing, direction
 //! cosines and the place of the middle, sample (nx, ny, nz) / 2, in RAS and millimetres. Where it says that these are
 //! not valid, FreeSurfer takes a spacing of 1 and coronal slices about the origin; so does this reader, with a note.
+//! Cosines that are no unit vectors are taken for not valid, too.
 //! What stands behind the samples (scan parameters, names) does not count.
 
 use std::io::Read;
+
+use atomesh::geometry::dot;
 
 use super::affine::{self, Affine};
 use super::codec::{Begins, Codec, Source};
@@ -15,6 +18,7 @@ use super::error::ReadReason;
 use super::format::ImageFormat;
 use super::gunzip::{GZIP, Unpacked};
 use super::note::{LoadedImage, ReadNote};
+use super::options::GivenFrame;
 use super::sample_type::{ByteOrder, SampleType};
 use super::stream;
 use super::volumes::Volumes;
@@ -40,6 +44,9 @@ pub(super) const GZIPPED: Codec = Codec {
 /// The bytes before the first sample.
 const HEADER: usize = 284;
 
+/// How far the squared length of direction cosines, in single precision, may be from 1.
+const COSINE: f64 = 0.02;
+
 /// Coronal slices: x to the left, y down, z to the front, one after another.
 const CORONAL: [[f64; 3]; 3] = [[-1.0, 0.0, 0.0], [0.0, 0.0, -1.0], [0.0, 1.0, 0.0]];
 
@@ -53,8 +60,13 @@ struct Header {
     shape: [usize; 3],
     frames: u64,
     sample_type: SampleType,
-    /// None if the header says that its own is not valid.
-    affine: Option<Affine>,
+    /// Whether the header says that its frame is valid.
+    is_valid: bool,
+    spacing: [f64; 3],
+    /// The directions of the axes, one after another.
+    axes: [[f64; 3]; 3],
+    /// Where the sample in the middle is.
+    middle: [f64; 3],
 }
 
 impl Header {
@@ -90,8 +102,29 @@ impl Header {
         let axes: [[f64; 3]; 3] =
             std::array::from_fn(|c| std::array::from_fn(|r| real(3 + 3 * c + r)));
         let middle = [12, 13, 14].map(real);
-        let affine = is_valid.then(|| about(shape, spacing, axes, middle));
-        Ok(Self { shape, frames, sample_type, affine })
+        Ok(Self { shape, frames, sample_type, is_valid, spacing, axes, middle })
+    }
+
+    /// The frame, and what there is to note of it. Directions that the caller gives go before those of the header.
+    fn affine(&self, given: GivenFrame) -> (Affine, Option<ReadNote>) {
+        let Self { shape, is_valid, spacing, axes, middle, .. } = *self;
+        let is_cosine = |axis: &[f64; 3]| (dot(axis, axis) - 1.0).abs() <= COSINE;
+        if !is_valid {
+            let fault = "the header says that its frame is not valid";
+            let usual = "steps of 1 mm and coronal slices about the origin, as FreeSurfer does,";
+            let affine = about(shape, [1.0; 3], CORONAL, [0.0; 3]);
+            return (affine, Some(ReadNote::UsualFrame { fault, usual }));
+        }
+        if given.direction {
+            return (about(shape, spacing, Affine::scaling([1.0; 3]).matrix, middle), None);
+        }
+        if !axes.iter().all(is_cosine) {
+            let fault = "the header's direction cosines are no unit vectors";
+            let usual = "coronal slices, with its spacing about its middle,";
+            let affine = about(shape, spacing, CORONAL, middle);
+            return (affine, Some(ReadNote::UsualFrame { fault, usual }));
+        }
+        (about(shape, spacing, axes, middle), None)
     }
 }
 
@@ -131,14 +164,11 @@ fn read(source: Source, is_gz: bool) -> Result<LoadedImage, ReadReason> {
     if source.is_packed != is_gz {
         notes.push(ReadNote::Gzip { is_packed: source.is_packed });
     }
-    if header.affine.is_none() {
-        let usual = "steps of 1 mm and coronal slices about the origin, as FreeSurfer does,";
-        notes.push(ReadNote::UsualFrame { usual });
-    }
+    let (affine, usual) = header.affine(options.given);
+    notes.extend(usual);
     let (which, chosen) = volumes.chosen(options.stack.volume)?;
     notes.extend(chosen);
     let length = if source.is_packed { length } else { length.saturating_sub(HEADER as u64) };
-    let affine = header.affine.unwrap_or_else(|| about(header.shape, [1.0; 3], CORONAL, [0.0; 3]));
     let mut values = Values::new(FORMAT, options.meaning);
     let samples = || volumes.read(which, &mut source, length, &mut values, memory);
     let loaded = affine::placed(FORMAT, &header.shape, affine.with_given(options.given), samples)?;

@@ -323,7 +323,9 @@ pub enum ReadNote {
     },
     /// The header says nothing valid of its frame; what its format takes then is taken.
     UsualFrame {
-        /// What that is.
+        /// What is wrong with the header's.
+        fault: &'static str,
+        /// What is taken.
         usual: &'static str,
     },
     /// A file is or is not packed by gzip, unlike what its name says.

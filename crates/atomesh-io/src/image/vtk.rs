@@ -401,12 +401,8 @@ mod tests {
             is_chosen: false,
         };
         assert_eq!(loaded.notes, [note]);
-        // cells 2 × 1 × 1: one row is no slice
         let cells = load(&text, Some("c")).unwrap();
-        assert_eq!(
-            (cells.image.shape(), cells.image.origin()),
-            (vec![2, 1, 1], vec![10.5, 21.0, 32.0])
-        );
+        assert_eq!((cells.image.shape(), cells.image.origin()), (vec![2, 1], vec![10.5, 21.0]));
         assert!(load(&text, Some("v")).unwrap_err().to_string().contains("3 values a sample"));
         let error = load(&text, Some("x")).unwrap_err().to_string();
         assert!(error.contains("v, my scan, c; expected one, not \"x\""), "{error}");

@@ -50,6 +50,18 @@ fn a_frame_that_is_not_valid_is_that_of_coronal_slices_with_a_note() {
 }
 
 #[test]
+fn cosines_that_are_no_unit_vectors_do_not_count() {
+    let odd = file(1, |bytes| bytes[42..46].copy_from_slice(&2f32.to_be_bytes()));
+    let loaded = load(&odd, None).unwrap();
+    assert_eq!((loaded.image.spacing(), loaded.notes.len()), (vec![0.5, 1.0, 2.0], 1));
+    assert_eq!(loaded.image.origin(), load(&file(1, |_| {}), None).unwrap().image.origin());
+    let given = GivenFrame { direction: true, ..GivenFrame::default() };
+    let options = ReadOptions { given, ..ReadOptions::default() };
+    let loaded = load_bytes(&odd, FORMAT, &options, &mut Silent).unwrap();
+    assert_eq!((loaded.image.origin(), loaded.notes), (vec![9.25, 19.0, 28.0], vec![]));
+}
+
+#[test]
 fn one_frame_of_several_is_chosen() {
     let bytes = file(3, |_| {});
     let text = load(&bytes, None).unwrap_err().to_string();

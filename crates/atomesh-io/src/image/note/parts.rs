@@ -64,9 +64,7 @@ impl ReadNote {
             Self::NoMatrix { taken } => {
                 write!(f, "the matrix of the sform is 0; {taken} is taken")
             }
-            Self::UsualFrame { usual } => {
-                write!(f, "the header says of its frame that it is not valid; {usual} are taken")
-            }
+            Self::UsualFrame { fault, usual } => write!(f, "{fault}; {usual} are taken"),
             Self::Gzip { is_packed: true } => {
                 f.write_str("the file is packed by gzip, which its name does not say")
             }

@@ -41,21 +41,23 @@ impl Form {
             );
         if is_colour {
             channels = shape.remove(0);
+            shape.truncate(if shape.last() == Some(&1) { 2 } else { 3 });
             note = Some(ReadNote::ColourAxis { shape: numpy.clone() });
-        } else if shape.len() > 2
-            && (2..shape.len()).contains(&shape.iter().filter(|n| **n != 1).count())
-        {
+        } else if shape.len() > 3 {
             shape.retain(|&n| n != 1);
             note = Some(ReadNote::UnitAxes { shape: numpy.clone() });
         }
-        let long: Vec<usize> = stored.iter().copied().filter(|&n| n != 1).collect();
-        let turned = match (header.fortran_order, long.as_slice()) {
+        // axes of length 1 change no order
+        let long = || stored.iter().copied().filter(|&n| n != 1).collect::<Vec<usize>>();
+        let turned = match (header.fortran_order, stored.as_slice()) {
             (false, _) => None,
-            (true, &[nx, ny, nz]) => Some([nx, ny, nz]),
             (true, &[nx, ny]) => Some([nx, ny, 1]),
-            (true, &[n]) => Some([n, 1, 1]),
-            (true, &[]) => Some([1; 3]),
-            (true, _) => return Err(unsupported(&numpy)),
+            (true, &[nx, ny, nz]) => Some([nx, ny, nz]),
+            (true, _) => match long()[..] {
+                [nx, ny] => Some([nx, ny, 1]),
+                [nx, ny, nz] => Some([nx, ny, nz]),
+                _ => return Err(unsupported(&numpy)),
+            },
         };
         if !(2..=3).contains(&shape.len()) {
             return Err(unsupported(&numpy));

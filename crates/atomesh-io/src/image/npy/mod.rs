@@ -1,8 +1,8 @@
 //! NumPy's array file, versions 1 to 3 (NEP 1): a magic, a Python dictionary as text, the samples.
 //!
 //! An array (z, y, x) in C order has x fastest, as our samples have; one in Fortran order is turned
-//! while it is read. What else an array may be, `form` tells: axes of length 1 are left out, and a last axis of 3 or 4
-//! is one of colours.
+//! while it is read. What else an array may be, `form` tells: of more than three axes those of length 1 are left out, and
+//! a last axis of 3 or 4 is one of colours.
 
 use std::io::Read;
 

@@ -54,7 +54,9 @@ impl Palette {
             })?;
             colours.extend(colour);
         }
-        if self.map.iter().all(|value| value.is_multiple_of(257)) {
+        // 8 bits are widened to 16 in either way
+        let is_byte = |value: &u16| value.is_multiple_of(257) || value.is_multiple_of(256);
+        if self.map.iter().all(is_byte) {
             return values.of(colours.into_iter().map(|value| (value >> 8) as u8).collect(), 3);
         }
         values.of(colours, 3)

@@ -342,9 +342,8 @@ fn labels_of_a_palette_are_its_indices() {
         .collect();
     let file = pages(1, &[&[0, 1], &[2, 1]], &[short(262, 3), (320, 3, map)]);
     let picture = load(&file, StackOptions::default()).unwrap();
-    // Rec. 601 of 0xff00 red, 0x8200 green and 0xff00 blue, its weights rounded to 2⁻¹⁶
-    let luminance = vec![19_518, 19_536, 7_442, 19_536];
-    assert_eq!(*picture.image.samples(), Samples::U16(luminance.into()));
+    // Rec. 601 of 255 red, 130 green and 255 blue
+    assert_eq!(*picture.image.samples(), Samples::U8(vec![76, 76, 29, 76].into()));
     assert_eq!(picture.notes, [ReadNote::PaletteLuminance]);
     let labels = meant(&file, Meaning::Labels).unwrap();
     assert_eq!(*labels.image.samples(), Samples::U8(vec![0, 1, 2, 1].into()));
