@@ -44,7 +44,22 @@ fn refusal(error: ReadError) -> JobError {
         ReadReason::SparseTraces { .. } | ReadReason::NoLine { .. } => JobError::content(&reason)
             .advise("--trace-bytes INLINE,XLINE says where numbers are; one byte twice makes a line"),
         ReadReason::DuplicateTraces { .. } => JobError::content(&reason).advise(
-            "--trace-bytes INLINE,XLINE says where, if their numbers are elsewhere; else remove one of them",
+            "--trace-bytes INLINE,XLINE says where, if their numbers are elsewhere; else --duplicates first or \
+             last keeps one of them",
+        ),
+        ReadReason::TruncatedTraces { .. } => JobError::content(&reason)
+            .advise("--truncated reads the whole traces; the header may be wrong about their length, too"),
+        ReadReason::Volumes { count, .. } => {
+            JobError::misuse(&reason).advise(format!("--volume N, 1 to {count}, chooses one"))
+        }
+        ReadReason::Arrays { .. } => {
+            JobError::misuse(&reason).advise("--array NAME chooses one")
+        }
+        ReadReason::Segments { .. } => {
+            JobError::misuse(&reason).advise("--segment NAME or its number chooses one")
+        }
+        ReadReason::Sheared { .. } => JobError::content(&reason).advise(
+            "resample the image, or give --direction M11,M12,... with axes at right angles",
         ),
         ReadReason::DataOutside { .. } => JobError::content(&reason)
             .advise("--data-root DIR allows files in DIR and below"),

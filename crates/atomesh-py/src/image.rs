@@ -319,16 +319,16 @@ pub fn is_path(value: &Bound<'_, PyAny>) -> bool {
     value.is_instance_of::<PyString>() || value.hasattr("__fspath__").unwrap_or(false)
 }
 
-/// Reads an image: TIFF, PNG, JPEG, PNM, NumPy, NIfTI, NRRD, MetaImage, VTI, SEG-Y, RSF, DICOM files and folders, and raw
-/// samples.
+/// Reads an image: TIFF, PNG, JPEG, PNM, NumPy, NIfTI, FreeSurfer, NRRD, MetaImage, VTI, VTK, SEG-Y, Seismic Unix, RSF,
+/// DICOM, folders of slices, and raw samples.
 ///
 /// Parameters
 /// ----------
 /// path : path-like
-///     The file, or the folder of a DICOM series.
+///     The file, or the folder of a DICOM series or of TIFF or PNG slices.
 /// **options
 ///     How it is read and placed, as the command's options: `spacing`, `origin`, `direction`, `channel`, `time`,
-///     `labels_by_color`, `vertical`, `sample_format` ...; for raw samples `shape` (x first), `dtype`, `byte_order`,
+///     `volume`, `array`, `segment`, `labels_by_color`, `vertical`, `sample_format` ...; for raw samples `shape` (x first), `dtype`, `byte_order`,
 ///     `offset`. See `atomesh.FrameOptions`. Also `meaning`: "brightness" (default), "labels" or "mask": what the values
 ///     are, which decides what is read of colours and rounded; and `progress`.
 ///

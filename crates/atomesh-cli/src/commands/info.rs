@@ -41,7 +41,7 @@ pub struct InfoArgs {
 /// [`JobError`] if the file cannot be read.
 pub fn run(args: &InfoArgs, watch: &mut dyn Watch) -> Result<String, JobError> {
     let options = args.frame.read_options()?;
-    let is_mesh = MeshFormat::of(&args.file).is_ok() || mesh_file::is_list(&args.file);
+    let is_mesh = MeshFormat::is_mesh(&args.file) || mesh_file::is_list(&args.file);
     if options.raw.is_none() && is_mesh {
         return match &mesh_file::read(&args.file, watch)? {
             MeshFile::Flat(loaded) => mesh_text(loaded, &Dimension::plane(), watch),

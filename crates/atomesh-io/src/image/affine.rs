@@ -6,12 +6,15 @@ use atomesh::image::{Frame, Image, Samples};
 use super::any_image::AnyImage;
 use super::error::ReadReason;
 use super::format::ImageFormat;
-use super::note::ReadNote;
+use super::note::{LoadedImage, ReadNote};
 use super::options::GivenFrame;
 
 /// The greatest |cosine| of the angle between two axes that a [`Frame`] tolerates, 0.006 degrees off; beyond
 /// it they are sheared.
 const SHEAR: f64 = 1e-4;
+
+/// The same up to which sheared axes give way to the nearest ones at right angles, 0.1 degrees off.
+const LEAST_REFUSED: f64 = 1.75e-3;
 
 /// Which way the axes of a header's world point. Ours is RAS, x to the right, y to the front, z to the
 /// top of the head, wherever a header speaks of a body; other coordinates stand as they are.
@@ -70,6 +73,48 @@ impl Affine {
         self
     }
 
+    /// A column, the step from one sample to the next along an axis.
+    fn column(&self, axis: usize) -> [f64; 3] {
+        std::array::from_fn(|r| self.matrix[r][axis])
+    }
+
+    /// The same with the nearest axes at right angles, where they are hardly sheared, and the note that says so.
+    pub fn squared(self, shape: &[usize]) -> (Self, Option<ReadNote>) {
+        let columns = [0, 1, 2].map(|axis| self.column(axis));
+        let lengths = columns.map(|column| dot(&column, &column).sqrt());
+        let axes = shape.len().min(3);
+        let unit: [[f64; 3]; 3] = std::array::from_fn(|c| columns[c].map(|x| x / lengths[c]));
+        let (mut worst, mut odd) = (SHEAR, None);
+        for first in 0..axes {
+            for second in first + 1..axes {
+                let cosine = dot(&unit[first], &unit[second]);
+                // of columns that are no vectors nothing is greater
+                if cosine.abs() > worst {
+                    (worst, odd) = (cosine.abs(), Some((first, second, cosine)));
+                }
+            }
+        }
+        let Some((first, second, cosine)) = odd.filter(|_| worst <= LEAST_REFUSED) else {
+            return (self, None);
+        };
+        let mut square = self;
+        for (c, column) in orthonormal_of(&unit[..axes]).into_iter().enumerate() {
+            (0..3).for_each(|r| square.matrix[r][c] = column[r] * lengths[c]);
+        }
+        let far: Vec<f64> = shape.iter().map(|&n| n.saturating_sub(1) as f64).collect();
+        let moved = (0..1 << axes).map(|corner| {
+            let along = |c: usize| if corner >> c & 1 == 1 { far[c] } else { 0.0 };
+            let shift = |r: usize| -> f64 {
+                (0..axes).map(|c| (square.matrix[r][c] - self.matrix[r][c]) * along(c)).sum()
+            };
+            let shift: [f64; 3] = std::array::from_fn(shift);
+            dot(&shift, &shift).sqrt()
+        });
+        let degrees = cosine.acos().to_degrees();
+        let distance = moved.fold(0.0, f64::max);
+        (square, Some(ReadNote::Sheared { first, second, degrees, distance }))
+    }
+
     /// The same samples in our world. LPS is RAS turned by half about z, so that nothing is mirrored.
     pub fn turned_from(mut self, world: World) -> Self {
         let turned = match world {
@@ -108,6 +153,71 @@ pub(super) fn image(
         }
         _ => Err(wrong(format, "axes", shape.len().to_string(), "2 or 3")),
     }
+}
+
+/// The image of the samples that `read` returns, placed by an affine, as [`image`]. Axes that are hardly sheared are
+/// put at right angles, with a note. A single slice is flat: where it lies across z it keeps its place, elsewhere it
+/// lies in its own plane, and a note says where that is.
+///
+/// # Errors
+/// As [`image`].
+pub(super) fn placed(
+    format: ImageFormat,
+    shape: &[usize],
+    affine: Affine,
+    read: impl FnOnce() -> Result<Samples, ReadReason>,
+) -> Result<LoadedImage, ReadReason> {
+    let (shape, affine, slice) = match slice_axes(shape) {
+        None => (shape.to_vec(), affine, None),
+        Some(kept) => {
+            let (affine, note) = slice(&affine, kept);
+            (kept.map(|axis| shape[axis]).to_vec(), affine, note)
+        }
+    };
+    let (affine, sheared) = affine.squared(&shape);
+    let image = image(format, &shape, affine, read)?;
+    Ok(LoadedImage::from(image).noting(sheared).noting(slice))
+}
+
+/// The two axes along which a single slice has its samples.
+fn slice_axes(shape: &[usize]) -> Option<[usize; 2]> {
+    let long: Vec<usize> = (0..shape.len()).filter(|&axis| shape[axis] > 1).collect();
+    match (shape.len(), &long[..]) {
+        (2, _) => Some([0, 1]),
+        (3, _) if shape[2] == 1 => Some([0, 1]),
+        (3, &[first, second]) => Some([first, second]),
+        _ => None,
+    }
+}
+
+/// A slice in the plane x, y of the world, if it lies along that, else in its own plane; and what there is to note.
+fn slice(affine: &Affine, kept: [usize; 2]) -> (Affine, Option<ReadNote>) {
+    let [x, y] = kept.map(|axis| affine.column(axis));
+    let size = x.iter().chain(&y).fold(0.0, |most: f64, value| value.abs().max(most));
+    let origin = affine.origin;
+    let is_level = [x[2], y[2]].iter().all(|z| z.abs() <= SHEAR * size);
+    let columns = if is_level {
+        [x, y, [0.0, 0.0, 1.0]]
+    } else {
+        // the slice's own plane, x along its first axis
+        let length = dot(&x, &x).sqrt();
+        let along = dot(&x, &y) / length;
+        // what rounding leaves of a right angle
+        let along = if along.abs() < 1e-12 * size { 0.0 } else { along };
+        let across = (dot(&y, &y) - along * along).max(0.0).sqrt();
+        [[length, 0.0, 0.0], [along, across, 0.0], [0.0, 0.0, 1.0]]
+    };
+    let matrix = std::array::from_fn(|r| std::array::from_fn(|c| columns[c][r]));
+    let flat = Affine { matrix, origin: if is_level { origin } else { [0.0; 3] } };
+    let note = match is_level {
+        true if origin[2] == 0.0 => None,
+        true => Some(ReadNote::LevelSlice { z: origin[2] }),
+        false => {
+            let unit = |v: [f64; 3]| v.map(|x| x / dot(&v, &v).sqrt());
+            Some(ReadNote::ObliqueSlice { origin, axes: [unit(x), unit(y)] })
+        }
+    };
+    (flat, note)
 }
 
 /// The error for an entry of a header.
@@ -197,6 +307,20 @@ fn orthonormal<const D: usize>(columns: [[f64; D]; D]) -> [[f64; D]; D] {
     columns
 }
 
+/// The same for some of the world's three dimensions.
+fn orthonormal_of(columns: &[[f64; 3]]) -> Vec<[f64; 3]> {
+    match columns {
+        &[x, y] => {
+            // the third is across both, so that it stays out of the way
+            let z =
+                [x[1] * y[2] - x[2] * y[1], x[2] * y[0] - x[0] * y[2], x[0] * y[1] - x[1] * y[0]];
+            orthonormal([x, y, z])[..2].to_vec()
+        }
+        &[x, y, z] => orthonormal([x, y, z]).to_vec(),
+        others => others.to_vec(),
+    }
+}
+
 #[cfg(test)]
 mod tests {
     use super::super::nifti::rotation;
@@ -215,6 +339,54 @@ mod tests {
             }
             other => panic!("{other:?}"),
         }
+    }
+
+    #[test]
+    fn a_small_shear_gives_way_to_the_nearest_axes() {
+        for (tilt, is_small) in [(5e-5, false), (2e-4, true), (1.7e-3, true), (2e-3, false)] {
+            let mut affine = Affine::scaling([1.0, 2.0, 3.0]);
+            affine.matrix[0][2] = 3.0 * tilt;
+            let (square, note) = affine.squared(&[5, 6, 11]);
+            let Some(note) = note.filter(|_| is_small) else {
+                assert_eq!((square, is_small), (affine, false), "{tilt}");
+                continue;
+            };
+            // each of the two axes turns by half of the angle
+            let half = tilt / 2.0;
+            assert!((square.matrix[0][2] - 3.0 * half).abs() < 1e-8);
+            assert!((square.matrix[2][0] + half).abs() < 1e-8);
+            assert!(frame(FORMAT, [5, 6, 11], square).is_ok());
+            let ReadNote::Sheared { first: 0, second: 2, degrees, distance } = note else {
+                panic!("{note:?}");
+            };
+            assert!((degrees - 90.0 + tilt.to_degrees()).abs() < 1e-6, "{degrees}");
+            let most = half * (30.0f64.powi(2) + 4.0f64.powi(2)).sqrt();
+            // but for the second order of the tilt
+            assert!((distance - most).abs() < 1e-5, "{distance} {most}");
+        }
+    }
+
+    #[test]
+    fn a_slice_lies_in_its_own_plane_and_a_note_says_where() {
+        let samples = || Ok(Samples::U8(vec![0; 6].into()));
+        let mut affine = Affine::scaling([1.0, 2.0, 3.0]);
+        affine.origin = [10.0, 20.0, 30.0];
+        let flat = placed(FORMAT, &[2, 3, 1], affine, samples).unwrap();
+        assert_eq!((flat.image.shape(), flat.image.origin()), (vec![2, 3], vec![10.0, 20.0]));
+        assert_eq!(flat.notes, [ReadNote::LevelSlice { z: 30.0 }]);
+        let upright = placed(FORMAT, &[2, 1, 3], affine, samples).unwrap();
+        assert_eq!(
+            (upright.image.spacing(), upright.image.origin()),
+            (vec![1.0, 3.0], vec![0.0; 2])
+        );
+        let axes = [[1.0, 0.0, 0.0], [0.0, 0.0, 1.0]];
+        assert_eq!(upright.notes, [ReadNote::ObliqueSlice { origin: affine.origin, axes }]);
+        // a row along z is no slice, and a slice has to have vectors
+        assert_eq!(placed(FORMAT, &[1, 1, 6], affine, samples).unwrap().image.shape(), [1, 1, 6]);
+        affine.matrix[2][2] = 0.0;
+        assert!(placed(FORMAT, &[2, 1, 3], affine, samples).is_err());
+        affine.matrix[0][2] = f64::NAN;
+        assert!(placed(FORMAT, &[2, 1, 3], affine, samples).is_err());
     }
 
     #[test]

@@ -33,6 +33,8 @@ pub(super) struct Codec {
     pub read: Reader,
     /// The writer, if the format is written.
     pub write: Option<Writer>,
+    /// Where meshes have the same endings: whether the file at a path is an image.
+    pub is_no_mesh: Option<fn(&Path) -> bool>,
     /// Where a folder can be an image of the format: what finds and reads it.
     pub folder: Option<Folder>,
 }
@@ -51,6 +53,7 @@ impl Codec {
             writes_floats: false,
             read,
             write: None,
+            is_no_mesh: None,
             folder: None,
         }
     }
@@ -58,9 +61,19 @@ impl Codec {
     /// Whether a file may begin with these bytes.
     pub fn may_begin_with(&self, head: &[u8]) -> bool {
         match self.begins {
-            Begins::Anyhow => true,
+            Begins::Anyhow | Begins::Mostly(_) => true,
             Begins::With(magics) => magics.iter().any(|magic| head.starts_with(magic)),
             Begins::If(test) => test(head),
+        }
+    }
+
+    /// Whether bytes begin with a magic word of the format.
+    pub fn is_told_by(&self, head: &[u8]) -> bool {
+        match self.begins {
+            Begins::With(magics) | Begins::Mostly(magics) => {
+                magics.iter().any(|magic| head.starts_with(magic))
+            }
+            Begins::Anyhow | Begins::If(_) => false,
         }
     }
 
@@ -76,6 +89,8 @@ pub(super) enum Begins {
     Anyhow,
     /// With one of these magic words, by which the format can be told.
     With(&'static [&'static [u8]]),
+    /// With one of these magic words, by which the format can be told, or as the reader checks.
+    Mostly(&'static [&'static [u8]]),
     /// As a test of the first eight bytes, or all of a shorter file, asks for.
     If(fn(&[u8]) -> bool),
 }
@@ -89,7 +104,8 @@ pub(super) type Writer =
 
 /// What makes one image of the files in a folder.
 pub(super) struct Folder {
-    /// Whether the file at a path is one of such a folder, whatever its name is.
+    /// Whether the file at a path is one of such a folder, whatever its name is; or the folder is one, where only
+    /// what it holds can tell.
     pub is_part: fn(&Path) -> bool,
     pub read: fn(&Path, &ReadOptions, &mut dyn Watch) -> Result<LoadedImage, ReadReason>,
 }
@@ -112,6 +128,8 @@ pub(super) struct Source<'a> {
     pub length: u64,
     /// Where other files of the image may be, if that is known.
     pub folders: Option<DataFolders<'a>>,
+    /// The file's own name there.
+    pub name: Option<&'a str>,
     pub memory: Memory,
     pub options: &'a ReadOptions,
 }

@@ -42,7 +42,7 @@ channels!(u8 => U8, u16 => U16, u32 => U32);
 
 /// Makes one value of the channels of each sample, by what values mean; page after page of a file.
 pub(super) struct Values {
-    format: ImageFormat,
+    pub format: ImageFormat,
     pub meaning: Meaning,
     colours: Colours,
     notes: Vec<ReadNote>,

@@ -125,11 +125,49 @@ pub enum ReadReason {
         /// The size of the file.
         file_bytes: u64,
     },
-    /// More than one volume in a file.
-    #[error("holds {count} volumes; expected one: extract the volume to be meshed")]
+    /// More than one volume in a file, and none of them was chosen, or one that is not there.
+    #[error("holds {count} volumes of {shape} samples; expected one{}", not("volume", *.wanted))]
     Volumes {
         /// The number of volumes.
         count: u64,
+        /// The samples of each along x, y (and z), as in `640 × 480`.
+        shape: String,
+        /// The volume asked for, from 1.
+        wanted: Option<usize>,
+    },
+    /// A file holds several arrays, and none of them was chosen, or one that is not there.
+    #[error("holds the arrays {found}; expected one{}", not_named(wanted.as_deref()))]
+    Arrays {
+        /// The arrays with their shapes as NumPy has them, as in `a (3, 4), b (5, 6)`.
+        found: String,
+        /// The name asked for.
+        wanted: Option<String>,
+    },
+    /// Segments overlap and none was chosen, or one was asked for that is not there.
+    #[error("holds the segments {found}{}; expected one{}", overlap(*.layers), not_named(wanted.as_deref()))]
+    Segments {
+        /// The segments with their numbers, as in `1 bone, 2 skin`.
+        found: String,
+        /// The layers in which they are, 1 if they do not overlap.
+        layers: usize,
+        /// What was asked for.
+        wanted: Option<String>,
+    },
+    /// A slice in a folder is unlike the others.
+    #[error("{file} holds {found}; expected {expected}")]
+    OtherSlice {
+        /// The slice's name.
+        file: String,
+        /// Its shape and type.
+        found: String,
+        /// The first slice's, with its name.
+        expected: String,
+    },
+    /// A folder has slices of more than one kind.
+    #[error("holds {found}; expected slices of one kind")]
+    MixedSlices {
+        /// How many there are of each kind, as in `7 of PNG, 3 of TIFF`.
+        found: String,
     },
     /// Colours are to be labels.
     #[error(
@@ -169,7 +207,7 @@ pub enum ReadReason {
     /// The axes of the header's affine matrix are not at right angles.
     #[error(
         "the header's axes {first} and {second} meet at {degrees:.3} degrees; expected 90, since a \
-         sheared grid has no frame: resample the image"
+         sheared grid has no frame"
     )]
     Sheared {
         /// The first axis of the pair, 0 for x.
@@ -232,6 +270,22 @@ pub enum ReadReason {
         second: usize,
         /// What they both are, as in `inline 12, crossline 34`.
         number: String,
+    },
+    /// A seismic file ends inside of a trace, or before those that it promises.
+    #[error(
+        "with {samples} samples per trace, {found} traces{} are whole and {rest} bytes are left over; expected whole \
+         traces: the file is cut short, or the header is wrong about their length or number",
+        promised.map_or_else(String::new, |promised| format!(" of {promised}"))
+    )]
+    TruncatedTraces {
+        /// The whole traces.
+        found: u64,
+        /// The traces promised, if it is known.
+        promised: Option<u64>,
+        /// The samples of a trace, as the header says.
+        samples: usize,
+        /// The bytes behind the last whole trace.
+        rest: u64,
     },
     /// The numbers of traces span a grid that is nearly empty.
     #[error(
@@ -329,6 +383,21 @@ fn beginning(head: &[u8]) -> String {
 /// What there is of memory.
 fn left(limit: Option<u64>) -> String {
     limit.map_or_else(String::new, |limit| format!(", of which {limit} are left"))
+}
+
+/// The number that was asked for, in a message.
+fn not(name: &str, number: Option<usize>) -> String {
+    number.map_or_else(String::new, |number| format!(", not {name} {number}"))
+}
+
+/// The name that was asked for, in a message.
+fn not_named(name: Option<&str>) -> String {
+    name.map_or_else(String::new, |name| format!(", not {name:?}"))
+}
+
+/// That segments overlap.
+fn overlap(count: usize) -> &'static str {
+    if count > 1 { ", which overlap" } else { "" }
 }
 
 /// What was asked for, in the message of a stack.

@@ -44,7 +44,7 @@ fn unsupported(found: String, expected: &'static str) -> ReadReason {
 
 /// Reads a `.mha` or `.mhd` file.
 fn read(source: Source) -> Result<LoadedImage, ReadReason> {
-    let Source { bytes: source, length: file_bytes, folders, memory, options } = source;
+    let Source { bytes: source, length: file_bytes, folders, memory, options, .. } = source;
     let mut source = BufReader::with_capacity(1 << 16, source);
     let mut lines = Lines::new(&mut source);
     let entries = Entries::read(&mut lines)?;
@@ -52,8 +52,9 @@ fn read(source: Source) -> Result<LoadedImage, ReadReason> {
     let payload = entries.payload()?;
     let affine = entries.affine(payload.shape.len())?;
     let read = || payload.read(source, rest, folders, memory);
-    let image = affine::image(FORMAT, &payload.shape, affine.with_given(options.given), read)?;
-    Ok(LoadedImage::from(image).noting(entries.world().note()))
+    let affine = affine.with_given(options.given);
+    let loaded = affine::placed(FORMAT, &payload.shape, affine, read)?;
+    Ok(loaded.noting(entries.world().note()))
 }
 
 /// The entries of a header by their names, and the files that it lists.

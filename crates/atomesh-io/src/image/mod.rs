@@ -10,13 +10,16 @@
 //! | --- | --- | --- | --- |
 //! | PNG, JPEG, PNM | png, jpg jpeg, pgm ppm pbm pnm pam | 8 and 16 bits; colour to luminance | none |
 //! | TIFF | tif tiff | integers, floats; many pages are a volume, or a stack of channels and times | spacing |
-//! | NPY | npy | every real type; arrays (y, x) or (z, y, x) | none |
-//! | NIfTI-1 | nii nii.gz | every real type; one volume | sform, else qform, else spacing |
+//! | slices | a folder of TIFF, PNG, JPEG or PNM | as those | spacing |
+//! | NPY, NPZ | npy, npz | every real type; arrays (y, x) or (z, y, x) | none |
+//! | NIfTI-1, NIfTI-2 | nii nii.gz hdr img | every real type, RGB; one volume | sform, else qform, else spacing |
+//! | MGH, MGZ | mgh mgz | bytes, integers, floats; one volume | RAS |
 //! | DICOM | a folder of slices, dcm | integers, rescaled to float32 | LPS turned to RAS |
 //! | MetaImage | mha, mhd | every real type; zlib | LPS turned to RAS where the file speaks of a body |
-//! | NRRD | nrrd, nhdr | every real type; gzip, ascii | LPS, LAS turned to RAS; others as they are |
-//! | VTI | vti | every real type; zlib, base64, ascii | as it is |
-//! | SEG-Y | segy sgy | IBM and IEEE floats, integers; lines and cubes | by coordinates and interval |
+//! | NRRD | nrrd, nhdr | every real type; gzip, bzip2, ascii, hex; segments | LPS, LAS turned to RAS; others as they are |
+//! | VTI | vti | every real type; zlib, LZ4, LZMA, base64, ascii | as it is |
+//! | VTK | vtk | every real type; ascii, binary | as it is |
+//! | SEG-Y, SU | segy sgy, su | IBM and IEEE floats, integers; lines and cubes | by coordinates and interval |
 //! | RSF | rsf | floats, integers; native, XDR, ASCII | o and d of each axis |
 //! | raw | raw, or any with a layout | every real type | none |
 //!
@@ -27,13 +30,13 @@
 //!
 //! | file | its world | read as |
 //! | --- | --- | --- |
-//! | NIfTI-1 | RAS | it is |
+//! | NIfTI, MGH | RAS | it is |
 //! | DICOM | LPS | turned to RAS |
 //! | NRRD, `space` right-, left-anterior-superior, left-posterior-superior | as named | turned to RAS |
 //! | NRRD, any other `space` or none | unknown | it is |
 //! | MetaImage with `AnatomicalOrientation` or a medical `Modality` | LPS | turned to RAS |
 //! | MetaImage with neither | unknown | it is |
-//! | VTI | unknown | it is |
+//! | VTI, VTK | unknown | it is |
 //!
 //! Meshes and images are written in the same coordinates: NIfTI and NRRD say RAS, VTI and mesh formats
 //! have no word for it. Flat images of NRRD and MetaImage stand as they are, unless they name a body.
@@ -47,7 +50,7 @@
 //! | values | as brightness | as labels ([`Meaning`]) |
 //! | --- | --- | --- |
 //! | colour | luminance | refused; or a label a colour, black 0, others from 1 by ascending red, green, blue |
-//! | palette | of its colours (PNG), refused (TIFF) | the indices |
+//! | palette | of its colours | the indices |
 //! | grey of 1, 2 or 4 bits (PNG, TIFF), PNM of another greatest value | stretched to 8 or 16 bits | as stored |
 //! | PBM | black 0, white 255 | black 0, white 1 |
 //! | TIFF with 0 for white | turned round | as stored |
@@ -64,19 +67,23 @@ use crate::atomic_file::AtomicFile;
 
 mod affine;
 mod any_image;
+mod channels;
 mod codec;
 mod colour;
 mod detached;
 mod dicom;
 mod error;
 mod format;
+mod gunzip;
 mod jpeg;
 mod length;
 mod memory;
 mod metaimage;
+mod mgh;
 mod nifti;
 mod note;
 mod npy;
+mod npz;
 mod nrrd;
 mod options;
 mod payload;
@@ -88,6 +95,7 @@ mod sample_type;
 mod segy;
 mod series_error;
 mod shape;
+mod slices;
 mod spelling;
 mod stream;
 mod table;
@@ -95,7 +103,9 @@ mod text;
 mod tiff;
 mod traces;
 mod view;
+mod volumes;
 mod vti;
+mod vtk;
 mod watched;
 
 pub use any_image::AnyImage;
@@ -107,7 +117,7 @@ pub use length::metres;
 use memory::Memory;
 pub use note::{IntervalSource, LoadedImage, ReadNote};
 pub use options::{
-    GivenFrame, Meaning, RawLayout, ReadOptions, SegyOptions, StackOptions, Vertical,
+    Duplicates, GivenFrame, Meaning, RawLayout, ReadOptions, SegyOptions, StackOptions, Vertical,
 };
 pub use sample_type::{ByteOrder, SampleType, UnknownByteOrder, UnknownSampleType};
 pub use series_error::SeriesError;
@@ -150,7 +160,8 @@ pub fn load_image(
     options: &ReadOptions,
     watch: &mut dyn Watch,
 ) -> Result<LoadedImage, ReadError> {
-    load(path, options, watch).map_err(|reason| ReadError { path: path.into(), reason })
+    let loaded = load(path, options, watch).map(|loaded| wanted(loaded, options));
+    loaded.map_err(|reason| ReadError { path: path.into(), reason })
 }
 
 fn load(
@@ -169,9 +180,7 @@ fn load(
     let metadata = path.metadata().map_err(ReadReason::Io)?;
     if metadata.is_dir() {
         return match &format.codec().folder {
-            Some(folder) => {
-                (folder.read)(path, options, watch).map(|loaded| wanted(loaded, options))
-            }
+            Some(folder) => (folder.read)(path, options, watch),
             None => Err(ReadReason::Io(std::io::ErrorKind::IsADirectory.into())),
         };
     }
@@ -182,7 +191,8 @@ fn load(
     let mut file = File::open(path).map_err(ReadReason::Io)?;
     let root = options.data_root.as_deref();
     let folders = path.parent().map(|own| DataFolders { own, root });
-    let file = Stored { bytes: &mut file, length: metadata.len(), folders };
+    let name = path.file_name().and_then(|name| name.to_str());
+    let file = Stored { bytes: &mut file, length: metadata.len(), folders, name };
     decode(file, format, options, watch)
 }
 
@@ -199,6 +209,12 @@ pub fn decode_image(
     load_bytes(bytes, format, options, watch).map(|loaded| loaded.image)
 }
 
+/// Whether a file is an image though its name is that of a mesh, too: `.npz` and `.vtk` can be either.
+pub(crate) fn is_image_named_as_mesh(path: &Path) -> bool {
+    let test = ImageFormat::from_path(path).and_then(|format| format.codec().is_no_mesh);
+    test.is_some_and(|is_image| is_image(path))
+}
+
 fn load_bytes(
     bytes: &[u8],
     format: ImageFormat,
@@ -206,8 +222,9 @@ fn load_bytes(
     watch: &mut dyn Watch,
 ) -> Result<LoadedImage, ReadReason> {
     let mut cursor = Cursor::new(bytes);
-    let stored = Stored { bytes: &mut cursor, length: bytes.len() as u64, folders: None };
-    decode(stored, format, options, watch)
+    let stored =
+        Stored { bytes: &mut cursor, length: bytes.len() as u64, folders: None, name: None };
+    decode(stored, format, options, watch).map(|loaded| wanted(loaded, options))
 }
 
 /// The bytes of a file, their number, and where the files that it names may be, if that is known.
@@ -215,6 +232,8 @@ struct Stored<'a> {
     bytes: &'a mut dyn Input,
     length: u64,
     folders: Option<DataFolders<'a>>,
+    /// The file's own name there.
+    name: Option<&'a str>,
 }
 
 fn decode(
@@ -223,7 +242,7 @@ fn decode(
     options: &ReadOptions,
     watch: &mut dyn Watch,
 ) -> Result<LoadedImage, ReadReason> {
-    let Stored { bytes, length, folders } = stored;
+    let Stored { bytes, length, folders, name } = stored;
     if length == 0 {
         return Err(ReadReason::Empty { format });
     }
@@ -239,8 +258,8 @@ fn decode(
     let bytes: &mut dyn Input = bytes; // no longer than the watch
     let bytes = Watched::new(bytes, length, watch, &cancelled);
     let memory = Memory::up_to(options.memory_limit);
-    let loaded = (codec.read)(Source { bytes, length, folders, memory, options });
-    if cancelled.get() { Err(Cancelled.into()) } else { loaded.map(|l| wanted(l, options)) }
+    let loaded = (codec.read)(Source { bytes, length, folders, name, memory, options });
+    if cancelled.get() { Err(Cancelled.into()) } else { loaded }
 }
 
 /// What was read, with notes on options that it did not meet. A spacing that the caller gives is in units of the
@@ -255,8 +274,16 @@ fn wanted(mut loaded: LoadedImage, options: &ReadOptions) -> LoadedImage {
     if options.meaning == Meaning::LabelsByColour && !has_colours {
         notes.push(ReadNote::NoColours);
     }
-    let StackOptions { channel, time } = options.stack;
-    for (name, wanted) in [("channel", channel), ("time", time)] {
+    let is_segment = |note: &ReadNote| matches!(note, ReadNote::Segment { .. });
+    if let Some(wanted) = options.segment.clone().filter(|_| !notes.iter().any(is_segment)) {
+        notes.push(ReadNote::NoSegments { wanted });
+    }
+    let is_array = |note: &ReadNote| matches!(note, ReadNote::OneArray { .. });
+    if let Some(wanted) = options.array.clone().filter(|_| !notes.iter().any(is_array)) {
+        notes.push(ReadNote::NoArrays { wanted });
+    }
+    let StackOptions { channel, time, volume } = options.stack;
+    for (name, wanted) in [("channel", channel), ("time", time), ("volume", volume)] {
         let is_said = |note: &ReadNote| matches!(note, ReadNote::Chosen { axis, .. } | ReadNote::OnePlane { axis, .. } if *axis == name);
         if let Some(wanted) = wanted.filter(|&n| n > 1)
             && !notes.iter().any(is_said)

@@ -6,6 +6,8 @@ use std::path::PathBuf;
 use super::any_image::AnyImage;
 use super::traces::SampleFormat;
 
+mod parts;
+
 /// An image, and what its file says or leaves open about it.
 #[derive(Clone, Debug)]
 pub struct LoadedImage {
@@ -291,6 +293,148 @@ pub enum ReadNote {
         /// Which numbers, as in `instance numbers`.
         numbers: &'static str,
     },
+    /// Axes that are hardly sheared gave way to the nearest ones at right angles.
+    Sheared {
+        /// The first axis of the worst pair, 0 for x.
+        first: usize,
+        /// The second axis of the pair.
+        second: usize,
+        /// The angle between the two in the file.
+        degrees: f64,
+        /// How far samples are moved at most, in world units.
+        distance: f64,
+    },
+    /// A single slice across z is flat, without the z of its place.
+    LevelSlice {
+        /// Its place.
+        z: f64,
+    },
+    /// A single slice is flat, in its own plane: x along its first axis, from its first sample.
+    ObliqueSlice {
+        /// The world coordinates of its first sample.
+        origin: [f64; 3],
+        /// The world directions of its axes.
+        axes: [[f64; 3]; 2],
+    },
+    /// A matrix of zeros in the header says nothing of the frame.
+    NoMatrix {
+        /// What is taken.
+        taken: &'static str,
+    },
+    /// The header says nothing valid of its frame; what its format takes then is taken.
+    UsualFrame {
+        /// What is wrong with the header's.
+        fault: &'static str,
+        /// What is taken.
+        usual: &'static str,
+    },
+    /// A file is or is not packed by gzip, unlike what its name says.
+    Gzip {
+        /// Whether it is.
+        is_packed: bool,
+    },
+    /// Colours were read as their luminance.
+    Luminance,
+    /// Colours of a palette were read as their luminance.
+    PaletteLuminance,
+    /// The last axis of an array was taken for colour channels.
+    ColourAxis {
+        /// The shape of the array as NumPy has it.
+        shape: Vec<usize>,
+    },
+    /// Axes of length 1 are left out.
+    UnitAxes {
+        /// The shape of the array as NumPy has it.
+        shape: Vec<usize>,
+    },
+    /// One of several arrays was read.
+    OneArray {
+        /// Its name.
+        name: String,
+        /// The names of the others.
+        others: Vec<String>,
+        /// Whether the caller named it.
+        is_chosen: bool,
+    },
+    /// An array was asked for by its name in a file that has no names of arrays.
+    NoArrays {
+        /// The name that was asked for.
+        wanted: String,
+    },
+    /// The slices of a volume are files in a folder.
+    Slices {
+        /// The name of the first.
+        first: String,
+        /// The name of the last.
+        last: String,
+        /// How many there are.
+        count: usize,
+    },
+    /// Numbers in the names of slices do not follow each other in even steps; the slices are taken to.
+    SliceNumbers {
+        /// The name before the gap.
+        before: String,
+        /// The name after it.
+        after: String,
+    },
+    /// Files in the folder are no slices and left out.
+    OtherFiles {
+        /// How many.
+        count: usize,
+        /// The name of the first.
+        first: String,
+    },
+    /// Pages of a TIFF that are smaller or marked as copies of others are left out.
+    SmallPages {
+        /// The pages that are left out.
+        left_out: usize,
+        /// All pages.
+        count: usize,
+        /// Shape and type of the first that is left out.
+        found: String,
+    },
+    /// A segment of a segmentation was read: 1 inside, 0 outside.
+    Segment {
+        /// Its name.
+        name: String,
+        /// Its number, from 1.
+        number: usize,
+        /// How many there are.
+        count: usize,
+    },
+    /// A segment was asked for in a file that names none.
+    NoSegments {
+        /// What was asked for.
+        wanted: String,
+    },
+    /// Traces that have the numbers of another one are left out.
+    DuplicateTraces {
+        /// How many are left out.
+        count: usize,
+        /// Whether the last ones count, not the first ones.
+        is_last: bool,
+        /// The number of the first that is left out, from 1.
+        trace: usize,
+    },
+    /// The file ends inside of a trace or before those that it promises; the whole ones are read.
+    TruncatedTraces {
+        /// The whole traces.
+        found: u64,
+        /// The traces promised, if it is known.
+        promised: Option<u64>,
+        /// The bytes behind the last whole trace.
+        rest: u64,
+    },
+    /// A file of revision 0 has textual headers as later revisions count them.
+    CountedTexts {
+        /// How many.
+        count: usize,
+    },
+    /// The header's additional trace headers are counted as another revision does, with which the file's size fits.
+    OtherRevision {
+        /// The count taken.
+        count: usize,
+    },
 }
 
 /// Where a sample interval stands.
@@ -357,7 +501,7 @@ impl ReadNote {
                 | Self::UsualResolution { .. }
                 | Self::Chosen { .. }
                 | Self::AtDetector { .. }
-        )
+        ) && self.parts_are_a_warning()
     }
 
     /// Whether it only tells what was read: nothing was guessed, filled, left out or changed.
@@ -365,6 +509,8 @@ impl ReadNote {
         match self {
             Self::Traces { .. } | Self::Line { .. } | Self::Turned { .. } | Self::Cells => true,
             Self::Vertical { is_known, .. } | Self::Axes { is_known, .. } => *is_known,
+            Self::Slices { .. } | Self::Segment { .. } => true,
+            Self::OneArray { is_chosen, .. } => *is_chosen,
             _ => false,
         }
     }
@@ -566,7 +712,7 @@ impl ReadNote {
                  volume"
             ),
             Self::Description { source, fault } => write!(f, "{source} does not count: {fault}"),
-            _ => Ok(()), // the others are written by their own
+            _ => self.write_parts(f),
         }
     }
 }

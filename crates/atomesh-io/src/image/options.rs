@@ -20,8 +20,14 @@ pub struct ReadOptions {
     pub memory_limit: Option<u64>,
     /// What the values of samples mean. Default: brightness.
     pub meaning: Meaning,
-    /// Which plane of a TIFF stack with several channels or times.
+    /// Which part of a file that holds several images.
     pub stack: StackOptions,
+    /// The array that is read, by its name, of files of several: NPZ, VTI and VTK. Default: the only one, or that
+    /// which a VTI names as its scalars.
+    pub array: Option<String>,
+    /// The segment of a segmentation (`.seg.nrrd`), by its name or its number from 1: samples are 1 inside and 0
+    /// outside. Default: all of them as labels, which those that overlap cannot be.
+    pub segment: Option<String>,
     /// The parts of the frame that the caller gives, which a file need not state. Default: none.
     pub given: GivenFrame,
 }
@@ -43,13 +49,15 @@ pub enum Meaning {
     Mask,
 }
 
-/// Which plane of a stack is read, counted from 1, as ImageJ shows them.
+/// Which part of a file that holds several images is read, counted from 1, as ImageJ shows them.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub struct StackOptions {
     /// The channel. Default: the only one.
     pub channel: Option<usize>,
     /// The point of time. Default: the only one.
     pub time: Option<usize>,
+    /// The volume of a NIfTI or FreeSurfer file of four axes. Default: the only one.
+    pub volume: Option<usize>,
 }
 
 /// Which parts of the frame the caller puts in place of the file's.
@@ -89,6 +97,20 @@ pub struct SegyOptions {
     pub sample_format: Option<SampleFormat>,
     /// What the samples of a trace are along. Default: unknown, which leaves its unit unnamed.
     pub vertical: Option<Vertical>,
+    /// Which of several traces with the same numbers is read. Default: they are an error.
+    pub duplicates: Option<Duplicates>,
+    /// Whether the whole traces of a file that ends inside of one are read. Default: false, it is an error.
+    pub truncated: bool,
+}
+
+/// Which of several traces with the same numbers is read.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash, serde::Serialize, serde::Deserialize)]
+#[serde(rename_all = "lowercase")]
+pub enum Duplicates {
+    /// That which comes first in the file.
+    First,
+    /// That which comes last.
+    Last,
 }
 
 /// What the vertical axis of seismic data is.

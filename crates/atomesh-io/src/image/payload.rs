@@ -6,16 +6,18 @@ use std::io::{self, BufRead, BufReader, Read};
 use std::path::PathBuf;
 
 use atomesh::image::Samples;
-use flate2::bufread::{MultiGzDecoder, ZlibDecoder};
+use bzip2_rs::DecoderReader as Bzip2Decoder;
+use flate2::bufread::ZlibDecoder;
 
 use super::detached::DataFolders;
 use super::error::ReadReason;
 use super::format::ImageFormat;
+use super::gunzip::Gunzip;
 use super::memory::Memory;
 use super::sample_type::{ByteOrder, SampleType};
 use super::shape::plausible_count;
 use super::stream::{self, GZIP_RATIO, Layout};
-use super::text::TextSamples;
+use super::text::{HexBytes, TextSamples};
 use super::watched::Watched;
 
 /// The most files that hold one image's samples.
@@ -35,7 +37,14 @@ pub(super) enum Encoding {
     Gzip,
     /// Packed by zlib.
     Zlib,
+    /// Packed by bzip2.
+    Bzip2,
+    /// Bytes in two hexadecimal digits each.
+    Hex,
 }
+
+/// The most bytes that a byte of bzip2 can stand for: a block of one value, 45 MB, takes some 40 bytes.
+const BZIP2_RATIO: u64 = 1 << 20;
 
 /// What a header says about its samples.
 #[derive(Clone, Debug)]
@@ -132,6 +141,8 @@ impl Payload {
             Encoding::Raw => ABSURD,
             Encoding::Text => 1,
             Encoding::Gzip | Encoding::Zlib => GZIP_RATIO / size,
+            Encoding::Bzip2 => BZIP2_RATIO / size,
+            Encoding::Hex => 1,
         };
         let count = plausible_count(&self.shape, bytes, density)?;
         let line_skip = if self.byte_skip.is_some() { self.line_skip } else { 0 };
@@ -153,8 +164,14 @@ impl Payload {
                 let mut words = TextSamples::new(source, self.sample_type);
                 self.samples(&mut words, [count; 2], memory)
             }
-            Encoding::Gzip => self.unpack(MultiGzDecoder::new(source), count, bytes, memory),
+            Encoding::Gzip => self.unpack(Gunzip::new(source), count, bytes, memory),
             Encoding::Zlib => self.unpack(ZlibDecoder::new(source), count, bytes, memory),
+            Encoding::Bzip2 => self.unpack(Bzip2Decoder::new(source), count, bytes, memory),
+            Encoding::Hex => {
+                let mut digits = HexBytes::new(source);
+                self.skip_inside(&mut digits)?;
+                self.samples(&mut digits, [count; 2], memory)
+            }
         }
     }
 

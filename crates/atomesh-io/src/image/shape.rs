@@ -18,6 +18,11 @@ pub(super) fn plausible_count(
     let count = shape.iter().try_fold(1usize, |n, &s| n.checked_mul(s));
     match count {
         Some(n) if n as u128 <= most => Ok(n),
-        _ => Err(ReadReason::TooLarge { shape: shape_text(shape), file_bytes }),
+        _ => Err(too_large(shape, file_bytes)),
     }
+}
+
+/// The error for a shape that a file of so many bytes cannot have.
+pub(super) fn too_large(shape: &[usize], file_bytes: u64) -> ReadReason {
+    ReadReason::TooLarge { shape: shape_text(shape), file_bytes }
 }

@@ -2,9 +2,12 @@
 
 use std::path::Path;
 
-use super::codec::{Begins, Codec};
+use super::codec::Codec;
 use super::format::ImageFormat;
-use super::{dicom, jpeg, metaimage, nifti, npy, nrrd, png, pnm, raw, rsf, segy, tiff, vti};
+use super::{
+    dicom, jpeg, metaimage, mgh, nifti, npy, npz, nrrd, png, pnm, raw, rsf, segy, slices, tiff,
+    vti, vtk,
+};
 
 /// Makes of each line a public constant and a row of the table.
 macro_rules! formats {
@@ -29,10 +32,18 @@ formats! {
     TIFF = tiff::CODEC;
     /// NumPy's array file.
     NPY = npy::CODEC;
-    /// NIfTI-1 in one file, `.nii`.
+    /// NumPy's archive of arrays.
+    NPZ = npz::CODEC;
+    /// NIfTI in one file, `.nii`, or in two, `.hdr` and `.img`.
     NIFTI = nifti::CODEC;
     /// The same compressed by gzip, `.nii.gz`.
     NIFTI_GZ = nifti::GZIPPED;
+    /// FreeSurfer's volumes, `.mgh`.
+    MGH = mgh::CODEC;
+    /// The same compressed by gzip, `.mgz`.
+    MGZ = mgh::GZIPPED;
+    /// A folder of slices, each a picture.
+    SLICES = slices::CODEC;
     /// DICOM, a folder of slices or `.dcm`.
     DICOM = dicom::CODEC;
     /// Nearly raw raster data, `.nrrd`, or `.nhdr` with the samples in other files.
@@ -41,8 +52,12 @@ formats! {
     META_IMAGE = metaimage::CODEC;
     /// VTK's XML format for images.
     VTI = vti::CODEC;
+    /// VTK's legacy format for images.
+    VTK = vtk::CODEC;
     /// SEG-Y, revisions 0 to 2.
     SEGY = segy::CODEC;
+    /// Seismic Unix.
+    SU = segy::su::CODEC;
     /// Madagascar's regularly sampled format.
     RSF = rsf::CODEC;
     /// Samples and nothing else.
@@ -57,16 +72,16 @@ impl ImageFormat {
         found.map(|codec| codec.format)
     }
 
-    /// The format of what is at a path: DICOM for a folder, and for a file of an unknown ending that begins
-    /// as DICOM does; else the format that the name promises.
+    /// The format of what is at a path: for a folder slices, if it holds pictures and nothing of DICOM, else DICOM; for
+    /// a file of an unknown ending DICOM if it begins so; else the format that the name promises.
     pub fn of(path: &Path) -> Option<Self> {
         let in_folder =
             || CODECS.iter().filter_map(|codec| Some((codec.format, codec.folder.as_ref()?)));
+        let by_content = || in_folder().find(|(_, folder)| (folder.is_part)(path));
         if path.is_dir() {
-            return in_folder().next().map(|(format, _)| format);
+            return Some(by_content().map_or(Self::DICOM, |(format, _)| format));
         }
-        let unnamed = || in_folder().find(|(_, folder)| (folder.is_part)(path));
-        Self::from_path(path).or_else(|| unnamed().map(|(format, _)| format))
+        Self::from_path(path).or_else(|| by_content().map(|(format, _)| format))
     }
 
     /// Its row; each format's constant is made of one.
@@ -129,9 +144,7 @@ impl ImageFormat {
 
     /// The format whose files begin with a magic word that these bytes begin with.
     pub(super) fn beginning_with(head: &[u8]) -> Option<Self> {
-        let is_told =
-            |codec: &&Codec| matches!(codec.begins, Begins::With(_)) && codec.may_begin_with(head);
-        CODECS.iter().find(is_told).map(|codec| codec.format)
+        CODECS.iter().find(|codec| codec.is_told_by(head)).map(|codec| codec.format)
     }
 }
 
@@ -176,7 +189,7 @@ mod tests {
 
     #[test]
     fn help_names_the_usual_endings() {
-        let read = ".png .jpg .pgm .tif .npy .nii .nii.gz .nrrd .mha .vti .segy .rsf";
+        let read = ".png .jpg .pgm .tif .npy .npz .nii .nii.gz .mgh .mgz .nrrd .mha .vti .vtk .segy .su .rsf";
         assert_eq!(ImageFormat::usual_endings(), read);
         let written = ".png, .tif, .npy, .nii, .nii.gz, .nrrd, .vti, .raw";
         assert_eq!(ImageFormat::usual_written_endings(", ", false), written);

@@ -150,6 +150,49 @@ impl<R: BufRead> Read for TextSamples<R> {
     }
 }
 
+/// Reads bytes that are written in two hexadecimal digits each, with gaps between any of them.
+pub(super) struct HexBytes<R> {
+    source: R,
+    /// The digits taken so far.
+    count: u64,
+}
+
+impl<R: BufRead> HexBytes<R> {
+    /// The bytes from where `source` is.
+    pub fn new(source: R) -> Self {
+        Self { source, count: 0 }
+    }
+
+    /// The next digit, if there is one.
+    fn digit(&mut self) -> io::Result<Option<u8>> {
+        loop {
+            let Some(&letter) = self.source.fill_buf()?.first() else { return Ok(None) };
+            self.source.consume(1);
+            if letter.is_ascii_whitespace() {
+                continue;
+            }
+            self.count += 1;
+            let digit = char::from(letter).to_digit(16).map(|digit| digit as u8);
+            // the letter is not told: a header may name any file as that of its samples
+            let wrong = || {
+                let text = format!("letter {} is no hexadecimal digit", self.count);
+                io::Error::new(io::ErrorKind::InvalidData, text)
+            };
+            return digit.map(Some).ok_or_else(wrong);
+        }
+    }
+}
+
+impl<R: BufRead> Read for HexBytes<R> {
+    fn read(&mut self, buffer: &mut [u8]) -> io::Result<usize> {
+        for filled in 0..buffer.len() {
+            let (Some(high), Some(low)) = (self.digit()?, self.digit()?) else { return Ok(filled) };
+            buffer[filled] = high << 4 | low;
+        }
+        Ok(buffer.len())
+    }
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;
@@ -190,5 +233,16 @@ mod tests {
         assert_eq!(lines.next().unwrap().unwrap(), "# \u{fffd}");
         assert_eq!(lines.next().unwrap().unwrap(), "last");
         assert_eq!((lines.next().unwrap(), lines.bytes), (None, 18));
+    }
+
+    #[test]
+    fn hexadecimal_digits_become_bytes() {
+        let mut bytes = Vec::new();
+        HexBytes::new(&b"0a Ff\n1 2"[..]).read_to_end(&mut bytes).unwrap();
+        assert_eq!(bytes, [0x0a, 0xff, 0x12]);
+        let odd = HexBytes::new(&b"0a0"[..]).read(&mut [0; 9]).unwrap();
+        assert_eq!(odd, 1);
+        let message = HexBytes::new(&b"0a password"[..]).read(&mut [0; 9]).unwrap_err().to_string();
+        assert_eq!(message, "letter 3 is no hexadecimal digit");
     }
 }

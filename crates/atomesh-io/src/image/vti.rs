@@ -1,8 +1,8 @@
 //! VTI, VTK's XML format for images: text, base64 or raw data, inline or appended, plain or packed by
-//! zlib.
+//! zlib, LZ4 or LZMA.
 //!
 //! World coordinates stand as they are in the file: VTK knows no body. One piece and one array of
-//! scalars is read: that which the file names as its scalars, else the first. Samples are the points; a
+//! scalars is read: that which is asked for, else that which the file names as its scalars, else the first. Samples are the points; a
 //! file that has values in cells alone has its samples in their middles, so the origin moves by half a
 //! step. An image of a single layer in z is flat.
 //!
@@ -29,6 +29,7 @@ use crate::mesh::MeshWriteError;
 use crate::mesh::column::{Column, Endian};
 use crate::mesh::vtu::appended::Head;
 use crate::mesh::vtu::array::{Array, Place};
+use crate::mesh::vtu::compressor::Compressor;
 use crate::mesh::vtu::read::{Document, Piece};
 use crate::mesh::vtu::xml::Tag;
 
@@ -47,6 +48,9 @@ pub(super) const CODEC: Codec = Codec {
     write: Some(write),
     ..Codec::reading(FORMAT, read)
 };
+
+/// The names of arrays that a message lists.
+const LISTED: usize = 20;
 
 /// VTK's name of this kind of file.
 const KIND: &str = "ImageData";
@@ -75,7 +79,8 @@ fn read(source: Source) -> Result<LoadedImage, ReadReason> {
         document.grid.as_ref().ok_or_else(|| wrong(KIND, "missing", "a tag of that name"))?;
     let (first, mut shape) = extent(piece.extent)?;
     let mut affine = affine_of(grid)?;
-    let (array, is_of_cells) = scalars(piece)?;
+    let wanted = options.array.as_deref();
+    let (array, is_of_cells) = scalars(piece, wanted)?;
     // sample 0 is where the extent begins
     let mut start = first;
     if is_of_cells {
@@ -87,10 +92,14 @@ fn read(source: Source) -> Result<LoadedImage, ReadReason> {
     for r in 0..3 {
         affine.origin[r] += (0..3).map(|c| affine.matrix[r][c] * start[c]).sum::<f64>();
     }
-    let axes = if shape[2] == 1 { 2 } else { 3 };
     let read = || samples(array, &shape, file_bytes, memory);
-    let image = affine::image(FORMAT, &shape[..axes], affine.with_given(options.given), read)?;
-    Ok(LoadedImage::from(image).noting(is_of_cells.then_some(ReadNote::Cells)))
+    let loaded = affine::placed(FORMAT, &shape, affine.with_given(options.given), read)?;
+    let chosen = wanted.map(|name| ReadNote::OneArray {
+        name: name.into(),
+        others: Vec::new(),
+        is_chosen: true,
+    });
+    Ok(loaded.noting(is_of_cells.then_some(ReadNote::Cells)).noting(chosen))
 }
 
 /// The first index along each axis, and the shape, of six numbers.
@@ -124,11 +133,24 @@ fn affine_of(grid: &Tag) -> Result<Affine, ReadReason> {
     })
 }
 
-/// The array that holds the image, and whether it is one of cells.
-fn scalars<'a, 'b>(piece: &'b Piece<'a>) -> Result<(&'b Array<'a>, bool), ReadReason> {
-    let is_of_cells = piece.point_data.is_empty();
+/// The array that holds the image, that which is wanted or else the file's scalars, and whether it is one of cells.
+fn scalars<'a, 'b>(
+    piece: &'b Piece<'a>,
+    wanted: Option<&str>,
+) -> Result<(&'b Array<'a>, bool), ReadReason> {
+    let has_wanted =
+        |arrays: &[Array]| wanted.is_some_and(|name| arrays.iter().any(|a| a.name == name));
+    let is_of_cells = match wanted {
+        Some(_) => !has_wanted(&piece.point_data),
+        None => piece.point_data.is_empty(),
+    };
     let arrays = if is_of_cells { &piece.cell_data } else { &piece.point_data };
-    let named = piece.scalars[usize::from(is_of_cells)].filter(|name| !name.is_empty());
+    if let Some(wanted) = wanted.filter(|_| !has_wanted(arrays)) {
+        let names = piece.point_data.iter().chain(&piece.cell_data);
+        let names: Vec<_> = names.take(LISTED).map(|array| array.name).collect();
+        return Err(ReadReason::Arrays { found: names.join(", "), wanted: Some(wanted.into()) });
+    }
+    let named = wanted.or(piece.scalars[usize::from(is_of_cells)]).filter(|name| !name.is_empty());
     let named = named.and_then(|name| arrays.iter().find(|a| a.name == name));
     let found = named.or_else(|| arrays.iter().find(|a| a.components == 1)).or(arrays.first());
     match found {
@@ -151,7 +173,8 @@ fn samples(
     let sample_type = spelling::named(array.kind, |own| own.vtk).ok_or_else(|| {
         unsupported(format!("samples of type {}", array.kind), "Int8 ... Float64")
     })?;
-    let count = plausible_count(shape, file_bytes, GZIP_RATIO)?;
+    let density = array.layout.compressor.map_or(1, Compressor::ratio).max(GZIP_RATIO);
+    let count = plausible_count(shape, file_bytes, density)?;
     let is_big = array.layout.endian == Endian::Big && !matches!(array.place, Place::Text(_));
     let byte_order = if is_big { ByteOrder::Big } else { ByteOrder::Little };
     let layout = Layout {

@@ -183,6 +183,11 @@ impl MeshFormat {
         found.ok_or_else(|| UnknownMeshFormat { path: path.into(), known: Self::endings() })
     }
 
+    /// Whether a file is a mesh by its name, and, where images have the same extension, by what is in it.
+    pub fn is_mesh(path: &Path) -> bool {
+        Self::of(path).is_ok() && !crate::image::is_image_named_as_mesh(path)
+    }
+
     /// The extensions that [`of`](Self::of) knows, for messages: `.vtu, .vtk, .msh (Gmsh 4.1), …`.
     pub fn endings() -> String {
         rows().iter().map(Row::text).collect::<Vec<_>>().join(", ")

@@ -70,7 +70,10 @@ fn messages_do_not_quote_files_of_samples_or_what_may_be_no_header() {
     let ascii = "n1=2 n2=2 data_format=ascii_float in=text";
     fs::write(scan.join("e.rsf"), ascii).unwrap();
     let mut names: Vec<_> = vec!["e.rsf".to_owned()];
-    for ending in ["png", "nhdr", "mhd", "rsf", "vti", "npy", "nii", "pgm", "tif", "segy", "jpg"] {
+    for ending in [
+        "png", "nhdr", "mhd", "rsf", "vti", "npy", "nii", "pgm", "tif", "segy", "jpg", "hdr",
+        "img", "mgh", "mgz", "npz", "vtk", "su",
+    ] {
         fs::write(scan.join(format!("f.{ending}")), "root:x:0:hidden\nroot = hidden\n").unwrap();
         names.push(format!("f.{ending}"));
     }
@@ -129,9 +132,25 @@ fn samples_are_not_read_into_more_memory_than_there_is() {
     fs::write(at("f.raw"), vec![7; 8192]).unwrap();
     let meta = "NDims = 2\nDimSize = 128 64\nElementType = MET_UCHAR\nElementDataFile = f.raw\n";
     fs::write(at("f.mhd"), meta).unwrap();
+    let bytes: Vec<u8> = [7, 0].repeat(4096);
+    let words = [1, 32, 32, 4, 1, 4, 0].map(i32::to_be_bytes);
+    let head = [words.as_flattened(), &[0; 256]].concat();
+    fs::write(at("v.mgh"), [&head[..], &bytes].concat()).unwrap();
+    let head =
+        b"# vtk DataFile Version 3.0\n\nBINARY\nDATASET STRUCTURED_POINTS\nDIMENSIONS 32 32 4\n\
+                 POINT_DATA 4096\nSCALARS a short\nLOOKUP_TABLE default\n";
+    fs::write(at("v.vtk"), [&head[..], &bytes].concat()).unwrap();
+    let mut zip = zip::ZipWriter::new(fs::File::create(at("v.npz")).unwrap());
+    zip.start_file("a.npy", zip::write::SimpleFileOptions::default()).unwrap();
+    zip.write_all(&fs::read(at("v.npy")).unwrap()).unwrap();
+    zip.finish().unwrap();
+    fs::create_dir(at("stack")).unwrap();
+    for name in ["stack/1.png", "stack/2.png"] {
+        fs::copy(at("f.png"), at(name)).unwrap();
+    }
     for name in [
         "v.npy", "v.nii", "v.nii.gz", "v.nrrd", "v.vti", "v.tif", "f.png", "f.pgm", "f.pbm",
-        "f.rsf", "f.mhd",
+        "f.rsf", "f.mhd", "v.mgh", "v.vtk", "v.npz",
     ] {
         let limited = |bytes| {
             let options = ReadOptions { memory_limit: Some(bytes), ..ReadOptions::default() };
@@ -142,6 +161,10 @@ fn samples_are_not_read_into_more_memory_than_there_is() {
         assert!(error.to_string().contains("of which 8191 are left"), "{error}");
         assert_eq!(limited(1 << 20).unwrap().samples().len() % 4096, 0, "{name}");
     }
+    // a limit that each slice keeps, and not both
+    let options = ReadOptions { memory_limit: Some(16_383), ..ReadOptions::default() };
+    let error = read(&at("stack"), &options).unwrap_err();
+    assert!(matches!(error.reason, ReadReason::Memory { bytes: 16_384, .. }), "{error}");
 }
 
 /// A chunk of a PNG.

@@ -1,5 +1,6 @@
 //! Tests of files, one program so that what they share is compiled and linked once.
 
+mod brought;
 mod cell_exports;
 mod cell_files;
 mod cell_values;

@@ -25,7 +25,7 @@ use std::path::PathBuf;
 
 use atomesh_flow::dg::{self, Form};
 use atomesh_flow::{Balance, Setting, Solution, WellFlow};
-use atomesh_io::image::{AnyImage, ImageFormat, LoadedImage};
+use atomesh_io::image::{AnyImage, LoadedImage};
 use atomesh_io::mesh::MeshFormat;
 
 use crate::dimension::Dimension;
@@ -265,8 +265,8 @@ impl Opened {
         }
         run.take_labels_alone();
         let path = shown(&run)?.to_path_buf();
-        let is_image = ImageFormat::of(&path).is_some() || run.frame.shape.is_some();
-        if !is_image && (mesh_file::is_list(&path) || MeshFormat::of(&path).is_ok()) {
+        let is_mesh = mesh_file::is_list(&path) || MeshFormat::is_mesh(&path);
+        if is_mesh && !path.is_dir() && run.frame.shape.is_none() {
             refuse_mesh_options(&run)?;
             let source = Source::Mesh(Box::new(flow_mesh::read(&path, session)?));
             return Ok(Self { run, options, files, source });

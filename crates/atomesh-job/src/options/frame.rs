@@ -4,8 +4,8 @@ use std::path::PathBuf;
 
 use atomesh::image::{Frame, FrameError, Image};
 use atomesh_io::image::{
-    ByteOrder, GivenFrame, Meaning, RawLayout, ReadOptions, SampleFormat, SampleType, SegyOptions,
-    StackOptions, Vertical,
+    ByteOrder, Duplicates, GivenFrame, Meaning, RawLayout, ReadOptions, SampleFormat, SampleType,
+    SegyOptions, StackOptions, Vertical,
 };
 use serde::{Deserialize, Serialize};
 
@@ -61,6 +61,17 @@ section! {
         /// TIFF stacks of several points of time: which one, from 1. Default: several are an error
         #[arg(long, value_name = "N", value_parser = count_in(1, "a number from 1"))]
         pub time: usize,
+        /// NIfTI and FreeSurfer files of several volumes (4-D): which one, from 1. Default: several are an error
+        #[arg(long, value_name = "N", value_parser = count_in(1, "a number from 1"))]
+        pub volume: usize,
+        /// NPZ, VTI and VTK files of several arrays: which one, by its name. Default: the only one that is an image; of
+        /// VTI and VTK the file's scalars, or the first
+        #[arg(long, value_name = "NAME")]
+        pub array: String,
+        /// Segmentations (.seg.nrrd): which segment, by its name or its number from 1; samples are 1 in it and 0
+        /// elsewhere. Default: all as labels; segments that overlap are an error
+        #[arg(long, value_name = "NAME|N")]
+        pub segment: String,
         /// Colour images as labels: one for each colour, black 0, the others from 1 by ascending red, green, blue.
         /// Default: false, colours are an error; grey values and indices of palettes are labels as they are
         #[arg(long, value_name = "BOOL", num_args = 0..=1, require_equals = true,
@@ -91,6 +102,14 @@ section! {
         /// SEG-Y: how samples are written, whatever the header's format code says. Default: what that says
         #[arg(long, value_name = "FORMAT", value_parser = named::<SampleFormat>(SampleFormat::NAMES))]
         pub sample_format: SampleFormat,
+        /// SEG-Y: which of several traces with the same numbers counts, the first or the last in the file. Default: they
+        /// are an error
+        #[arg(long, value_name = "WHICH", value_parser = named::<Duplicates>(&["first", "last"]))]
+        pub duplicates: Duplicates,
+        /// SEG-Y: read the whole traces of a file that is cut short. Default: false, such a file is an error
+        #[arg(long, value_name = "BOOL", num_args = 0..=1, require_equals = true,
+            default_missing_value = "true")]
+        pub truncated: bool,
         /// Folder in which, and below which, the headers of NRRD, MetaImage and RSF may name the files of
         /// their samples. Default: the header's own folder
         #[arg(long, value_name = "DIR")]
@@ -157,6 +176,8 @@ impl FrameOptions {
             coordinate_bytes: pair("--coordinate-bytes", &self.coordinate_bytes)?,
             sample_format: self.sample_format,
             vertical: self.vertical,
+            duplicates: self.duplicates,
+            truncated: self.truncated == Some(true),
         };
         if let Some(root) = self.data_root.as_ref().filter(|root| !root.is_dir()) {
             return Err(JobError::misuse(format!(
@@ -165,9 +186,10 @@ impl FrameOptions {
             )));
         }
         let data_root = self.data_root.clone();
-        let stack = StackOptions { channel: self.channel, time: self.time };
-        if [stack.channel, stack.time].contains(&Some(0)) {
-            return Err(JobError::misuse("--channel and --time count from 1"));
+        let Self { channel, time, volume, .. } = *self;
+        let stack = StackOptions { channel, time, volume };
+        if [channel, time, volume].contains(&Some(0)) {
+            return Err(JobError::misuse("--channel, --time and --volume count from 1"));
         }
         let given = GivenFrame {
             spacing: self.spacing.is_some(),
@@ -175,8 +197,19 @@ impl FrameOptions {
             direction: self.direction.is_some(),
         };
         let (raw, memory_limit) = (self.raw_layout()?, memory::room());
+        let (array, segment) = (self.array.clone(), self.segment.clone());
         let meaning = Meaning::default();
-        Ok(ReadOptions { raw, segy, data_root, memory_limit, stack, given, meaning })
+        Ok(ReadOptions {
+            raw,
+            segy,
+            data_root,
+            memory_limit,
+            stack,
+            array,
+            segment,
+            given,
+            meaning,
+        })
     }
 
     /// How images are read whose values mean that; labels go by colour if that is asked for.

@@ -8,7 +8,7 @@ use super::section::section;
 #[cfg(feature = "clap")]
 fn image_help() -> String {
     format!(
-        "Image to mesh: {}, a folder of DICOM slices, or raw samples with --shape and --dtype. Two axes \
+        "Image to mesh: {}, a folder of slices (DICOM, TIFF, PNG), or raw samples with --shape and --dtype. Two axes \
          make triangles, three make tetrahedra",
         atomesh_io::image::ImageFormat::usual_endings()
     )

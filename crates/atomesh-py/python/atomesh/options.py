@@ -272,6 +272,14 @@ class FrameOptions(TypedDict, total=False):
         TIFF stacks of several channels: which one, from 1, as ImageJ counts. Default: several are an error.
     time : int
         TIFF stacks of several points of time: which one, from 1. Default: several are an error.
+    volume : int
+        NIfTI and FreeSurfer files of several volumes (4-D): which one, from 1. Default: several are an error.
+    array : str
+        NPZ, VTI and VTK files of several arrays: which one, by its name. Default: the only one that is an image; of
+        VTI and VTK the file's scalars, or the first.
+    segment : str
+        Segmentations (.seg.nrrd): which segment, by its name or its number from 1; samples are 1 in it and 0
+        elsewhere. Default: all as labels; segments that overlap are an error.
     labels_by_color : bool
         Colour images as labels: one for each colour, black 0, the others from 1 by ascending red, green, blue.
         Default: False, colours are an error; grey values and indices of palettes are labels as they are.
@@ -292,6 +300,11 @@ class FrameOptions(TypedDict, total=False):
         that vary.
     sample_format : Literal["ibm", "ieee", "float64", "int32", "int16", "int8", "uint32", "uint16", "uint8"]
         SEG-Y: how samples are written, whatever the header's format code says. Default: what that says.
+    duplicates : Literal["first", "last"]
+        SEG-Y: which of several traces with the same numbers counts, the first or the last in the file. Default: they
+        are an error.
+    truncated : bool
+        SEG-Y: read the whole traces of a file that is cut short. Default: False, such a file is an error.
     data_root : PathLike
         Folder in which, and below which, the headers of NRRD, MetaImage and RSF may name the files of their samples.
         Default: the header's own folder.
@@ -307,6 +320,9 @@ class FrameOptions(TypedDict, total=False):
     fill: float
     channel: int
     time: int
+    volume: int
+    array: str
+    segment: str
     labels_by_color: bool
     shape: Sequence[int]
     dtype: str
@@ -315,6 +331,8 @@ class FrameOptions(TypedDict, total=False):
     trace_bytes: Sequence[int]
     coordinate_bytes: Sequence[int]
     sample_format: Literal["ibm", "ieee", "float64", "int32", "int16", "int8", "uint32", "uint16", "uint8"]
+    duplicates: Literal["first", "last"]
+    truncated: bool
     data_root: PathLike
     vertical: Literal["time", "depth"]
 

@@ -3,8 +3,12 @@
 use super::super::error::WriteReason;
 use super::super::view::ImageView;
 use super::FORMAT;
-use super::header::{BYTES, FIRST_SAMPLE, at};
+use super::header::{FIRST_BYTES, FIRST_SAMPLE};
+use super::places::FIRST;
 use super::quaternion::quaternion;
+
+/// Where the bits of a sample stand.
+const BITPIX: usize = 72;
 
 /// A header for samples that follow it in one file, and the four bytes that say that no extension
 /// does.
@@ -16,8 +20,8 @@ pub(super) fn encode(
     let mut bytes = [0; FIRST_SAMPLE as usize];
     let axes = image.dimension();
     let mut put = |at: usize, value: &[u8]| bytes[at..at + value.len()].copy_from_slice(value);
-    put(0, &(BYTES as i32).to_le_bytes());
-    put(at::DIM, &(axes as i16).to_le_bytes());
+    put(0, &(FIRST_BYTES as i32).to_le_bytes());
+    put(FIRST.dim, &(axes as i16).to_le_bytes());
     for axis in 0..7 {
         let count = image.shape.get(axis).copied().unwrap_or(1);
         let count = i16::try_from(count).map_err(|_| WriteReason::Shape {
@@ -25,29 +29,29 @@ pub(super) fn encode(
             shape: image.shape.clone(),
             expected: "up to 32767 along each axis; write .npy instead",
         })?;
-        put(at::DIM + 2 * (axis + 1), &count.to_le_bytes());
+        put(FIRST.dim + 2 * (axis + 1), &count.to_le_bytes());
     }
-    put(at::DATATYPE, &datatype.to_le_bytes());
-    put(at::BITPIX, &bits.to_le_bytes());
-    put(at::VOX_OFFSET, &(FIRST_SAMPLE as f32).to_le_bytes());
-    put(at::SCL_SLOPE, &1f32.to_le_bytes());
-    put(at::MAGIC, b"n+1\0");
+    put(FIRST.datatype, &datatype.to_le_bytes());
+    put(BITPIX, &bits.to_le_bytes());
+    put(FIRST.vox_offset, &(FIRST_SAMPLE as f32).to_le_bytes());
+    put(FIRST.scl_slope, &1f32.to_le_bytes());
+    put(FIRST.magic, b"n+1\0");
 
     let affine = image.affine();
     let (quaternion, qfac) = quaternion(image.direction, image.is_mirrored);
-    put(at::PIXDIM, &(qfac as f32).to_le_bytes());
-    put(at::QFORM_CODE, &2i16.to_le_bytes());
-    put(at::SFORM_CODE, &2i16.to_le_bytes());
+    put(FIRST.pixdim, &(qfac as f32).to_le_bytes());
+    put(FIRST.qform_code, &2i16.to_le_bytes());
+    put(FIRST.sform_code, &2i16.to_le_bytes());
     for k in 0..3 {
         let positive = single("spacing", image.spacing[k])?;
-        put(at::PIXDIM + 4 * (k + 1), &positive.to_le_bytes());
-        put(at::QUATERN_B + 4 * k, &(quaternion[k] as f32).to_le_bytes());
+        put(FIRST.pixdim + 4 * (k + 1), &positive.to_le_bytes());
+        put(FIRST.quatern_b + 4 * k, &(quaternion[k] as f32).to_le_bytes());
         let offset = single("origin", affine.origin[k])?;
-        put(at::QOFFSET_X + 4 * k, &offset.to_le_bytes());
+        put(FIRST.qoffset_x + 4 * k, &offset.to_le_bytes());
         for c in 0..3 {
-            put(at::SROW_X + 16 * k + 4 * c, &(affine.matrix[k][c] as f32).to_le_bytes());
+            put(FIRST.srow_x + 16 * k + 4 * c, &(affine.matrix[k][c] as f32).to_le_bytes());
         }
-        put(at::SROW_X + 16 * k + 12, &offset.to_le_bytes());
+        put(FIRST.srow_x + 16 * k + 12, &offset.to_le_bytes());
     }
     Ok(bytes)
 }

@@ -1,49 +1,46 @@
-//! NIfTI-1 in one file, plain or gzipped: a header of 348 bytes, then the samples, x fastest.
+//! NIfTI-1 and NIfTI-2, in one file or a pair of header and samples, plain or gzipped: a header, then the samples, x
+//! fastest, volume after volume. Written is NIfTI-1 in one file.
 //!
-//! Definition: <https://nifti.nimh.nih.gov/pub/dist/src/niftilib/nifti1.h>. World coordinates are
-//! the file's own: x to the right, y to the front, z to the top of the head (RAS+), nearly always
-//! in millimetres; the unit that the header names (`xyzt_units`) is stated, and none is changed. Two-file NIfTI (`.hdr` and `.img`), NIfTI-2 and ANALYZE are refused by name.
+//! Definition: <https://nifti.nimh.nih.gov/pub/dist/src/niftilib/nifti1.h> and `nifti2.h` beside it. World coordinates
+//! are the file's own: x to the right, y to the front, z to the top of the head (RAS+), nearly always in millimetres;
+//! the unit that the header names (`xyzt_units`) is stated, and none is changed. ANALYZE is refused by name.
 
-use std::io::{Read, Write};
+use std::io::Write;
 
 use atomesh::watch::Watch;
-use flate2::read::MultiGzDecoder;
 use flate2::write::GzEncoder;
 
 use super::affine;
-use super::any_image::AnyImage;
 use super::codec::{Begins, Codec, Output, Source};
+use super::colour::Values;
 use super::error::{ReadReason, WriteReason};
 use super::format::ImageFormat;
+use super::gunzip::{GZIP, Unpacked};
 use super::memory::Memory;
-use super::note::LoadedImage;
+use super::note::{LoadedImage, ReadNote};
+use super::options::{Meaning, ReadOptions};
 use super::sample_type::SampleType;
-use super::shape::plausible_count;
 use super::spelling::Spelling;
-use super::stream::{self, GZIP_RATIO, Layout};
+use super::stream;
 use super::view::ImageView;
+use super::volumes::Volumes;
 
 mod encode;
 mod header;
+mod pair;
+mod places;
 mod quaternion;
 
 use header::Header;
 #[cfg(test)]
 pub(super) use quaternion::rotation;
 
-const FORMAT: ImageFormat = ImageFormat::named("NIfTI-1");
-const FORMAT_GZIPPED: ImageFormat = ImageFormat::named("gzipped NIfTI-1");
-
-/// The most bytes that are unpacked behind the samples.
-const MOST_BEHIND: u64 = 1 << 24;
-
-/// The magic word of a gzip stream.
-const GZIP: &[u8] = b"\x1f\x8b";
+const FORMAT: ImageFormat = ImageFormat::named("NIfTI");
+const FORMAT_GZIPPED: ImageFormat = ImageFormat::named("gzipped NIfTI");
 
 pub(super) const CODEC: Codec = Codec {
     endings: &[".nii"],
-    // the magic word stands at the end of the header, where the reader looks for it
-    begins: Begins::If(|head| !head.starts_with(GZIP)),
+    header_endings: &[".hdr", ".img"],
     has_frame: true,
     z_is_height: true,
     writes_floats: true,
@@ -54,72 +51,91 @@ pub(super) const CODEC: Codec = Codec {
 pub(super) const GZIPPED: Codec = Codec {
     format: FORMAT_GZIPPED,
     endings: &[".nii.gz"],
-    begins: Begins::With(&[GZIP]),
+    header_endings: &[".hdr.gz", ".img.gz"],
+    begins: Begins::Mostly(&[GZIP]),
     read: read_gzipped,
     write: Some(write_gzipped),
     ..CODEC
 };
 
-/// Reads a `.nii` file.
+/// Reads a file whose name promises that it is plain.
 fn read(source: Source) -> Result<LoadedImage, ReadReason> {
-    let Source { bytes: mut source, length: file_bytes, memory, options, .. } = source;
-    let header = Header::read(&mut source)?.with_given(options.given);
-    let size = header.sample_type.size() as u64;
-    let found = file_bytes.saturating_sub(header.offset) / size;
-    // the header's axes are 16 bits wide, so that their product cannot overflow
-    let expected: u64 = header.shape.iter().map(|&n| n as u64).product();
-    if expected > found {
-        return Err(ReadReason::Truncated { expected, found });
-    }
-    let image = samples_after(&mut source, &header, [expected as usize; 2], memory)?;
-    Ok(in_units(image, &header))
+    read_either(source, false)
 }
 
-/// Reads a `.nii.gz` file. Memory is allocated as samples come, since the unpacked size is not known.
-/// The stream is unpacked up to its end, so that its check sum is checked, unless that is far behind the samples.
+/// Reads a file whose name promises gzip.
 fn read_gzipped(source: Source) -> Result<LoadedImage, ReadReason> {
-    let (file_bytes, memory, given) = (source.length, source.memory, source.options.given);
-    let mut source = MultiGzDecoder::new(std::io::BufReader::with_capacity(1 << 16, source.bytes));
-    let header = Header::read(&mut source)?.with_given(given);
-    let density = GZIP_RATIO / header.sample_type.size() as u64;
-    let count = plausible_count(&header.shape, file_bytes, density)?;
-    let packed_samples = file_bytes as usize / header.sample_type.size();
-    let image =
-        samples_after(&mut source, &header, [count, packed_samples.saturating_mul(4)], memory)?;
-    std::io::copy(&mut source.take(MOST_BEHIND), &mut std::io::sink())
-        .map_err(|e| ReadReason::decoder(FORMAT_GZIPPED, e))?;
-    Ok(in_units(image, &header))
+    read_either(source, true)
 }
 
-/// The image with the unit that its header names for all axes.
-fn in_units(image: AnyImage, header: &Header) -> LoadedImage {
-    let units = header.unit.map_or(Vec::new(), |unit| vec![unit.into(); header.shape.len()]);
-    LoadedImage { units, ..image.into() }
-}
-
-/// Skips what is between header and samples, and reads `count` of those, `reserve` of which memory is allocated for
-/// at once.
-fn samples_after(
-    source: &mut dyn Read,
-    header: &Header,
-    [count, reserve]: [usize; 2],
-    memory: Memory,
-) -> Result<AnyImage, ReadReason> {
-    let gap = header.offset - header::BYTES as u64;
-    let skipped = std::io::copy(&mut source.take(gap), &mut std::io::sink());
-    if skipped.map_err(|e| ReadReason::decoder(FORMAT, e))? < gap {
-        return Err(ReadReason::Truncated { expected: count as u64, found: 0 });
+/// Reads a file, or a pair of them by one of the two, plain or gzipped whatever their names are. A gzipped stream is
+/// unpacked up to its end, so that its check sum is checked, unless that is far behind the samples.
+fn read_either(source: Source, is_gz: bool) -> Result<LoadedImage, ReadReason> {
+    let Source { mut bytes, length, folders, name, memory, options } = source;
+    let names = name.and_then(pair::names);
+    if let Some(pair) = names.as_ref().filter(|pair| pair.is_samples) {
+        let (mut file, _) = pair.open(folders, &pair.header)?;
+        let header = Header::read(&mut Unpacked::new(&mut file)?.bytes)?;
+        return samples(header, Unpacked::new(bytes)?, length, (is_gz, memory, options));
     }
-    let layout = Layout {
+    let mut source = Unpacked::new(&mut bytes)?;
+    let header = Header::read(&mut source.bytes)?;
+    if !header.is_pair {
+        return samples(header, source, length, (is_gz, memory, options));
+    }
+    let pair = names.ok_or_else(|| {
+        header::wrong(
+            "magic",
+            "\"ni1\", a header without samples",
+            "\"n+1\", or names .hdr and .img",
+        )
+    })?;
+    drop(source);
+    let (file, length) = pair.open(folders, &pair.samples)?;
+    samples(header, Unpacked::new(bytes.over(file, length))?, length, (is_gz, memory, options))
+}
+
+/// Reads the volume that is wanted, from behind the header, or of a pair from the beginning of its samples.
+fn samples(
+    header: Header,
+    mut source: Unpacked,
+    length: u64,
+    (is_gz, memory, options): (bool, Memory, &ReadOptions),
+) -> Result<LoadedImage, ReadReason> {
+    let header = header.with_given(options.given);
+    let read_bytes = if header.is_pair { 0 } else { header.bytes };
+    let volumes = Volumes {
+        shape: &header.shape,
+        count: header.volumes,
         sample_type: header.sample_type,
+        channels: header.channels,
         byte_order: header.byte_order,
-        count,
-        reserve,
         scale: header.scale,
-        turned: None,
-        memory,
+        gap: header.offset.saturating_sub(read_bytes),
     };
-    affine::image(FORMAT, &header.shape, header.affine, || stream::read_samples(source, &layout))
+    let mut notes = header.notes;
+    if source.is_packed != is_gz {
+        notes.push(ReadNote::Gzip { is_packed: source.is_packed });
+    }
+    let (which, chosen) = volumes.chosen(options.stack.volume)?;
+    notes.extend(chosen);
+    let bytes = if source.is_packed { length } else { length.saturating_sub(read_bytes) };
+    let mut values = Values::new(FORMAT, options.meaning);
+    if header.channels > 1 && values.meaning == Meaning::Brightness {
+        values.note(ReadNote::Luminance);
+    }
+    let mut more = Vec::new();
+    let loaded = affine::placed(FORMAT, &header.shape, header.affine, || {
+        let samples = volumes.read(which, &mut source, bytes, &mut values, memory)?;
+        let (samples, said) = values.finish(samples);
+        more = said;
+        Ok(samples)
+    })?;
+    notes.extend(loaded.notes);
+    notes.extend(more);
+    let axes = loaded.image.dimension();
+    let units = header.unit.map_or(Vec::new(), |unit| vec![unit.into(); axes]);
+    Ok(LoadedImage { units, notes, ..loaded })
 }
 
 /// Writes a `.nii` file, the frame as sform and as qform (code 2, "aligned").

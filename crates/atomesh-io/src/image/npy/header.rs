@@ -13,8 +13,9 @@ use super::literal::{Words, wrong};
 const LONGEST_HEADER: usize = 1 << 16;
 
 /// What the dictionary says.
-pub(super) struct Header {
-    /// Samples along x, y (and z): the array's shape from its last axis to its first.
+#[derive(Debug)]
+pub(in super::super) struct Header {
+    /// The array's shape from its last axis to its first, x first.
     pub shape: Vec<usize>,
     pub sample_type: SampleType,
     pub byte_order: ByteOrder,
@@ -53,13 +54,6 @@ impl Header {
         let missing = |field| wrong(field, "missing", "an entry of that name");
         let (sample_type, byte_order) = sample_type(descr.ok_or_else(|| missing("descr"))?)?;
         let mut shape: Vec<usize> = shape.ok_or_else(|| missing("shape"))?;
-        if !(2..=3).contains(&shape.len()) {
-            return Err(ReadReason::Unsupported {
-                format: FORMAT,
-                found: format!("an array of {} axes, {shape:?}", shape.len()),
-                expected: "an array (y, x) or (z, y, x)",
-            });
-        }
         shape.reverse();
         let fortran_order = fortran_order.ok_or_else(|| missing("fortran_order"))?;
         Ok(Self { shape, sample_type, byte_order, fortran_order })

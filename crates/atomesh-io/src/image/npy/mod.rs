@@ -1,24 +1,32 @@
 //! NumPy's array file, versions 1 to 3 (NEP 1): a magic, a Python dictionary as text, the samples.
 //!
 //! An array (z, y, x) in C order has x fastest, as our samples have; one in Fortran order is turned
-//! while it is read.
+//! while it is read. What else an array may be, `form` tells: of more than three axes those of length 1 are left out, and
+//! a last axis of 3 or 4 is one of colours.
+
+use std::io::Read;
 
 use atomesh::watch::Watch;
 
 use super::any_image::AnyImage;
+use super::channels::mixed;
 use super::codec::{Begins, Codec, Output, Source};
+use super::colour::Values;
 use super::error::{ReadReason, WriteReason};
 use super::format::ImageFormat;
-use super::note::LoadedImage;
-use super::shape::plausible_count;
+use super::memory::Memory;
+use super::note::{LoadedImage, ReadNote};
+use super::options::Meaning;
 use super::spelling::Spelling;
 use super::stream::{self, Layout};
 use super::view::ImageView;
 
+mod form;
 mod header;
 mod literal;
 
-use header::Header;
+pub(super) use form::Form;
+pub(super) use header::Header;
 
 const FORMAT: ImageFormat = ImageFormat::named("NPY");
 
@@ -35,31 +43,53 @@ const ABSURD: u64 = 1 << 10;
 
 /// Reads an array of two or three axes.
 fn read(source: Source) -> Result<LoadedImage, ReadReason> {
-    let Source { bytes: mut source, length: file_bytes, memory, .. } = source;
-    let (header, start) = Header::read(&mut source)?;
-    let size = header.sample_type.size() as u64;
-    let count = plausible_count(&header.shape, file_bytes, ABSURD)?;
-    let found = file_bytes.saturating_sub(start) / size;
-    if count as u64 > found {
-        return Err(ReadReason::Truncated { expected: count as u64, found });
+    let Source { mut bytes, length: file_bytes, memory, options, .. } = source;
+    let (header, start) = Header::read(&mut bytes)?;
+    let form = Form::of(&header)?;
+    let numbers = form.count(file_bytes, ABSURD)?;
+    let found = file_bytes.saturating_sub(start) / header.sample_type.size() as u64;
+    if numbers as u64 > found {
+        let channels = form.channels as u64;
+        let (expected, found) = (numbers as u64 / channels, found / channels);
+        return Err(ReadReason::Truncated { expected, found });
     }
-    let turned = match *header.shape {
-        _ if !header.fortran_order => None,
-        [nx, ny] => Some([nx, ny, 1]),
-        [nx, ny, nz] => Some([nx, ny, nz]),
-        _ => None,
-    };
+    read_array(&mut bytes, &header, &form, [numbers; 2], (memory, options.meaning))
+}
+
+/// Reads the array behind a header as an image: `count` numbers, of which memory is allocated for `reserve` at once.
+pub(super) fn read_array(
+    source: &mut dyn Read,
+    header: &Header,
+    form: &Form,
+    [count, reserve]: [usize; 2],
+    (memory, meaning): (Memory, Meaning),
+) -> Result<LoadedImage, ReadReason> {
     let layout = Layout {
         sample_type: header.sample_type,
         byte_order: header.byte_order,
         count,
-        reserve: count,
+        reserve,
         scale: None,
-        turned,
+        turned: form.turned,
         memory,
     };
-    let samples = stream::read_samples(&mut source, &layout)?;
-    Ok(AnyImage::frameless(&header.shape, samples)?.into())
+    let mut values = Values::new(FORMAT, meaning);
+    let stored = stream::read_samples(source, &layout)?;
+    let (samples, notes) = match form.channels {
+        1 => (stored, Vec::new()),
+        channels => {
+            let mixed = mixed(stored, channels, &mut values)?;
+            values.finish(mixed)
+        }
+    };
+    let loaded = LoadedImage::from(AnyImage::frameless(&form.shape, samples)?);
+    let note = form.note.clone().filter(|note| {
+        // labels and masks say themselves what becomes of colours
+        meaning == Meaning::Brightness || !matches!(note, ReadNote::ColourAxis { .. })
+    });
+    let mut loaded = loaded.noting(note);
+    loaded.notes.extend(notes);
+    Ok(loaded)
 }
 
 /// Writes an array (y, x) or (z, y, x), version 1.0, as NumPy would.

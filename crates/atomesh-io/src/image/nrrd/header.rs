@@ -7,6 +7,7 @@ use super::super::sample_type::{ByteOrder, SampleType};
 use super::super::spelling;
 use super::super::text::{Lines, numbers, shortened};
 use super::FORMAT;
+use super::segments::{self, Segment};
 
 /// What a header says.
 #[derive(Debug)]
@@ -16,6 +17,10 @@ pub(super) struct Header {
     pub affine: Affine,
     /// The world of the file.
     pub world: World,
+    /// Values a sample, one for each layer of segments.
+    pub layers: usize,
+    /// The segments of a segmentation.
+    pub segments: Vec<Segment>,
 }
 
 /// The error for a field.
@@ -27,9 +32,10 @@ fn unsupported(found: String, expected: &'static str) -> ReadReason {
     ReadReason::Unsupported { format: FORMAT, found, expected }
 }
 
-/// The fields of a header by their names, and the files that it lists.
+/// The fields of a header by their names, its keys with their values, and the files that it lists.
 struct Fields {
     fields: Vec<(String, String)>,
+    keys: Vec<(String, String)>,
     listed: Vec<String>,
 }
 
@@ -38,7 +44,8 @@ impl Header {
     pub fn read(lines: &mut Lines) -> Result<Self, ReadReason> {
         let fields = Fields::read(lines)?;
         let sizes = fields.sizes()?;
-        let axes = fields.image_axes(&sizes)?;
+        let segments = segments::of_keys(&fields.keys);
+        let (axes, layers) = fields.image_axes(&sizes, !segments.is_empty())?;
         let shape: Vec<usize> = axes.iter().map(|&axis| sizes[axis]).collect();
         let sample_type = fields.sample_type()?;
         let payload = Payload {
@@ -55,14 +62,15 @@ impl Header {
             files: fields.files()?,
         };
         let (_, world) = fields.world()?;
-        Ok(Self { payload, affine: fields.affine(&axes, sizes.len())?, world })
+        let affine = fields.affine(&axes, sizes.len())?;
+        Ok(Self { payload, affine, world, layers, segments })
     }
 }
 
 impl Fields {
     fn read(lines: &mut Lines) -> Result<Self, ReadReason> {
         lines.next()?; // the magic, which was looked at
-        let (mut fields, mut listed) = (Vec::new(), Vec::new());
+        let (mut fields, mut keys, mut listed) = (Vec::new(), Vec::new(), Vec::new());
         let mut is_list = false;
         while let Some(line) = lines.next()? {
             if line.is_empty() {
@@ -72,7 +80,11 @@ impl Fields {
                 listed.push(line);
                 continue;
             }
-            if line.starts_with('#') || line.contains(":=") {
+            if line.starts_with('#') {
+                continue;
+            }
+            if let Some((key, value)) = line.split_once(":=") {
+                keys.push((key.to_owned(), value.to_owned()));
                 continue;
             }
             let (name, value) = line
@@ -84,7 +96,7 @@ impl Fields {
             is_list = name == "datafile" && value.split_whitespace().next() == Some("LIST");
             fields.push((name, value.to_owned()));
         }
-        Ok(Self { fields, listed })
+        Ok(Self { fields, keys, listed })
     }
 
     /// The value of a field.
@@ -125,17 +137,24 @@ impl Fields {
         Ok(kinds)
     }
 
-    /// The axes along which samples lie. Others must have a single sample.
-    fn image_axes(&self, sizes: &[usize]) -> Result<Vec<usize>, ReadReason> {
+    /// The axes along which samples lie, and the layers of segments, which may be the first axis. Others must have a
+    /// single sample.
+    fn image_axes(
+        &self,
+        sizes: &[usize],
+        has_segments: bool,
+    ) -> Result<(Vec<usize>, usize), ReadReason> {
         let kinds = self.kinds(sizes.len())?;
         let vectors = self.directions(sizes.len())?;
-        let mut axes = Vec::new();
+        let (mut axes, mut layers) = (Vec::new(), 1);
         for (axis, kind) in kinds.iter().enumerate() {
             let lies_in_space =
                 matches!(kind.as_str(), "space" | "domain" | "time" | "" | "???" | "none");
             let has_direction = vectors.as_ref().is_none_or(|v| v[axis].is_some());
             if lies_in_space && has_direction {
                 axes.push(axis);
+            } else if has_segments && axis == 0 {
+                layers = sizes[axis];
             } else if sizes[axis] > 1 {
                 let kind = if kind.is_empty() { "none" } else { kind };
                 let found = format!("an axis of {} values of kind {kind:?}", sizes[axis]);
@@ -146,7 +165,7 @@ impl Fields {
             axes.pop();
         }
         match axes.len() {
-            2 | 3 => Ok(axes),
+            2 | 3 => Ok((axes, layers)),
             found => Err(unsupported(format!("{found} axes, {sizes:?}"), "2 or 3 axes")),
         }
     }
@@ -175,10 +194,13 @@ impl Fields {
             "raw" => Ok(Encoding::Raw),
             "txt" | "text" | "ascii" => Ok(Encoding::Text),
             "gz" | "gzip" => Ok(Encoding::Gzip),
-            "hex" | "bz2" | "bzip2" | "zrl" | "zstd" => {
-                Err(unsupported(format!("samples encoded as {name}"), "raw, ascii or gzip"))
+            "hex" => Ok(Encoding::Hex),
+            "bz2" | "bzip2" => Ok(Encoding::Bzip2),
+            "zrl" | "zstd" => {
+                let expected = "raw, ascii, hex, gzip or bzip2";
+                Err(unsupported(format!("samples encoded as {name}"), expected))
             }
-            _ => Err(wrong("encoding", name, "raw, ascii or gzip")),
+            _ => Err(wrong("encoding", name, "raw, ascii, hex, gzip or bzip2")),
         }
     }
 

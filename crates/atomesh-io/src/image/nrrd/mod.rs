@@ -1,10 +1,13 @@
 //! NRRD, nearly raw raster data: a header in text, then the samples, x fastest; or the header alone
 //! (`.nhdr`) and the samples in other files.
 //!
-//! Definition: <https://teem.sourceforge.net/nrrd/format.html>. The encodings raw, ascii and gzip are
-//! read. A `space` of a body (left-posterior-superior, left-anterior-superior) is turned to RAS, as
+//! Definition: <https://teem.sourceforge.net/nrrd/format.html>. The encodings raw, ascii, hex, gzip and bzip2
+//! are read. A `space` of a body (left-posterior-superior, left-anterior-superior) is turned to RAS, as
 //! NIfTI's is; any other stands as it is. Axes of other kinds, such as colours or tensors, are
 //! refused unless they have a single value.
+//!
+//! Segmentations of 3D Slicer (`.seg.nrrd`) name their segments in keys of the header. Where segments overlap they are
+//! in several layers, the first axis, and one must be chosen.
 //!
 //! Written is gzip, with `space: right-anterior-superior` in 3-D: medical programs then find the image
 //! where the scan was, and others ignore the name.
@@ -25,6 +28,7 @@ use super::text::Lines;
 use super::view::ImageView;
 
 mod header;
+mod segments;
 
 use header::Header;
 
@@ -43,16 +47,25 @@ pub(super) const CODEC: Codec = Codec {
 
 /// Reads a `.nrrd` or `.nhdr` file.
 fn read(source: Source) -> Result<LoadedImage, ReadReason> {
-    let Source { bytes: source, length: file_bytes, folders, memory, options } = source;
+    let Source { bytes: source, length: file_bytes, folders, memory, options, .. } = source;
     let mut source = BufReader::with_capacity(1 << 16, source);
     let mut lines = Lines::new(&mut source);
     let header = Header::read(&mut lines)?;
     let rest = file_bytes.saturating_sub(lines.bytes);
     let payload = header.payload;
-    let read = || payload.read(source, rest, folders, memory);
+    let chosen = segments::chosen(&header.segments, header.layers, options.segment.as_deref())?;
+    let read = || match &chosen {
+        Some(chosen) => {
+            let mut layered = payload.clone();
+            layered.shape[0] = layered.shape[0].saturating_mul(header.layers);
+            let stored = layered.read(source, rest, folders, memory)?;
+            chosen.segment.inside(&stored, header.layers, memory)
+        }
+        None => payload.read(source, rest, folders, memory),
+    };
     let affine = header.affine.with_given(options.given);
-    let image = affine::image(FORMAT, &payload.shape, affine, read)?;
-    Ok(LoadedImage::from(image).noting(header.world.note()))
+    let loaded = affine::placed(FORMAT, &payload.shape, affine, read)?;
+    Ok(loaded.noting(header.world.note()).noting(chosen.map(|chosen| chosen.note())))
 }
 
 /// Writes a `.nrrd` file; numbers have all their digits, so that the frame is kept exactly.

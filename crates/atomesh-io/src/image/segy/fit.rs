@@ -8,6 +8,7 @@
 
 use super::super::error::ReadReason;
 use super::super::note::ReadNote;
+use super::super::traces::NOWHERE;
 use super::coordinates::{Coordinates, Vector, difference, dot, length, rounded, turned};
 use super::survey::Survey;
 
@@ -40,7 +41,8 @@ impl Located {
             let (place, nx) = (survey.places[trace], survey.shape[0]);
             Self { trace, indices: [(place % nx) as f64, (place / nx) as f64], position }
         };
-        coordinates.traces.iter().map(located).collect()
+        let has_place = |(trace, _): &&(usize, Vector)| survey.places[*trace] != NOWHERE;
+        coordinates.traces.iter().filter(has_place).map(located).collect()
     }
 }
 

@@ -3,6 +3,8 @@
 use std::io::{Read, Seek, SeekFrom};
 
 use super::super::error::ReadReason;
+use super::super::note::ReadNote;
+use super::super::options::SegyOptions;
 use super::super::sample_type::ByteOrder;
 use super::super::stream;
 use super::super::traces::SampleFormat;
@@ -38,6 +40,8 @@ pub(super) struct Header {
     pub trace_header: usize,
     /// The traces in the file.
     pub traces: usize,
+    /// What there is to note.
+    pub notes: Vec<ReadNote>,
 }
 
 impl Header {
@@ -46,12 +50,14 @@ impl Header {
         self.trace_header + self.samples * self.format.size()
     }
 
-    /// Reads the header, and the first trace's where that must help. A `given` format goes before the code's.
+    /// Reads the header, and the first trace's where that must help. Where revisions count what stands before and in
+    /// front of traces in other ways, that counts with which traces fill the file.
     pub fn read<R: Read + Seek>(
         source: &mut R,
         file_bytes: u64,
-        given: Option<SampleFormat>,
+        options: &SegyOptions,
     ) -> Result<Self, ReadReason> {
+        let given = options.sample_format;
         let mut bytes = [0; BINARY];
         source.seek(SeekFrom::Start(TEXT)).map_err(ReadReason::Io)?;
         if stream::fill(source, &mut bytes)? < BINARY {
@@ -62,53 +68,104 @@ impl Header {
         let view = Fields { bytes: &bytes, first: 3201, byte_order };
         let major = bytes[3501 - 3201];
         let format = given.map_or_else(|| format(view.i16(3225)), Ok)?;
-        let start = start(source, &view, major)?;
-        let extra = if major >= 2 { view.i32(3507) } else { 0 };
-        let extra = usize::try_from(extra).ok().filter(|&n| n <= 100).ok_or_else(|| {
-            wrong("additional trace headers", extra.to_string(), "a count from 0 to 100")
-        })?;
+        let starts = starts(source, &view, major)?;
+        let (extras, own_extra) = extras(&view, [major, bytes[3502 - 3201]])?;
+        let mut own = None;
+        for start in &starts {
+            for extra in &extras {
+                let header = Self::at(source, &view, (format, major), *start, *extra);
+                let is_whole = header.as_ref().is_ok_and(|header| header.fits(file_bytes));
+                match &own {
+                    None => own = Some(header),
+                    Some(Ok(own)) if own.fits(file_bytes) => {}
+                    Some(_) if !is_whole => {}
+                    Some(_) => own = Some(header),
+                }
+            }
+        }
+        let past = || {
+            let value = format!("past the end: the file has {file_bytes} bytes");
+            wrong("first trace", value, "a trace header of 240 bytes")
+        };
+        let mut header = own.unwrap_or_else(|| Err(past()))?;
+        if header.start != starts[0] {
+            let count = ((header.start - TEXT - BINARY as u64) / TEXT) as usize;
+            header.notes.push(ReadNote::CountedTexts { count });
+        }
+        let count = header.trace_header / TRACE_HEADER - 1;
+        if count as i64 != own_extra {
+            header.notes.push(ReadNote::OtherRevision { count });
+        }
+        let stated = if major >= 2 { view.u64(3513) } else { 0 };
+        header.count_traces(file_bytes, stated, options.truncated)?;
+        Ok(header)
+    }
 
+    /// What the header says if traces begin at a place, each with so many additional headers.
+    fn at<R: Read + Seek>(
+        source: &mut R,
+        view: &Fields<'_>,
+        (format, major): (SampleFormat, u8),
+        start: u64,
+        extra: usize,
+    ) -> Result<Self, ReadReason> {
+        let byte_order = view.byte_order;
         let mut first = [0; TRACE_HEADER];
         source.seek(SeekFrom::Start(start)).map_err(ReadReason::Io)?;
         if stream::fill(source, &mut first)? < TRACE_HEADER {
-            let value = format!("past the end: the file has {file_bytes} bytes");
+            let value = format!("past the end of the file, at {start}");
             return Err(wrong("first trace", value, "a trace header of 240 bytes"));
         }
         let trace = Fields { bytes: &first, first: 1, byte_order };
-        let mut header = Self {
+        Ok(Self {
             byte_order,
             format,
-            samples: samples(&view, &trace, major)?,
-            intervals: (wide_interval(&view, major), view.u16(3217)),
+            samples: samples(view, &trace, major)?,
+            intervals: (wide_interval(view, major), view.u16(3217)),
             is_in_feet: view.i16(3255) == 2,
             start,
             trace_header: TRACE_HEADER * (1 + extra),
             traces: 0,
-        };
-        let stated = if major >= 2 { view.u64(3513) } else { 0 };
-        header.traces = header.count(file_bytes, stated)?;
-        Ok(header)
+            notes: Vec::new(),
+        })
     }
 
-    /// The number of traces, from the file's size; the one stated if something may follow them.
-    fn count(&self, file_bytes: u64, stated: u64) -> Result<usize, ReadReason> {
+    /// Whether whole traces fill the file.
+    pub fn fits(&self, file_bytes: u64) -> bool {
+        let room = file_bytes.saturating_sub(self.start);
+        room > 0 && room.is_multiple_of(self.trace_bytes() as u64)
+    }
+
+    /// Counts traces, from the file's size; those that are stated if something may follow them.
+    ///
+    /// # Errors
+    /// [`ReadReason::TruncatedTraces`] if the last is cut short or some are missing, unless the whole ones are wanted.
+    pub fn count_traces(
+        &mut self,
+        file_bytes: u64,
+        stated: u64,
+        is_truncated: bool,
+    ) -> Result<(), ReadReason> {
         let each = self.trace_bytes() as u64;
         let room = file_bytes.saturating_sub(self.start);
         let (found, rest) = (room / each, room % each);
-        if stated > found {
-            let samples = self.samples as u64;
-            let expected = stated.saturating_mul(samples);
-            return Err(ReadReason::Truncated { expected, found: found * samples });
-        }
-        if stated > 0 {
-            return Ok(stated as usize);
-        }
-        if rest > 0 || found == 0 {
-            let value =
-                format!("{}, with which {found} traces leave {rest} bytes over", self.samples);
+        let samples = self.samples;
+        self.traces = match stated {
+            0 => found,
+            stated => stated.min(found),
+        } as usize;
+        if found == 0 {
+            let value = format!("{samples}, with which {found} traces leave {rest} bytes over");
             return Err(wrong("samples per trace", value, "whole traces, all of one length"));
         }
-        Ok(found as usize)
+        if stated > found || stated == 0 && rest > 0 {
+            let promised = (stated > 0).then_some(stated);
+            if !is_truncated {
+                return Err(ReadReason::TruncatedTraces { found, promised, samples, rest });
+            }
+            self.notes.push(ReadNote::TruncatedTraces { found, promised, rest });
+        }
+        Ok(())
     }
 }
 
@@ -133,38 +190,70 @@ fn byte_order(bytes: &[u8; BINARY], is_given: bool) -> Result<ByteOrder, ReadRea
     }
 }
 
-/// Where the first trace begins.
-fn start<R: Read + Seek>(source: &mut R, view: &Fields<'_>, major: u8) -> Result<u64, ReadReason> {
+/// Where the first trace may begin, the place that the revision says first.
+fn starts<R: Read + Seek>(
+    source: &mut R,
+    view: &Fields<'_>,
+    major: u8,
+) -> Result<Vec<u64>, ReadReason> {
     let least = TEXT + BINARY as u64;
     let stated = if major >= 2 { view.u64(3521) } else { 0 };
     if stated > 0 {
-        let value = || stated.to_string();
-        let expected = "3600 or more";
         let fits = stated >= least && stated <= i64::MAX as u64;
-        return if fits {
-            Ok(stated)
-        } else {
-            Err(wrong("first trace's offset", value(), expected))
+        return match fits {
+            true => Ok(vec![stated]),
+            false => Err(wrong("first trace's offset", stated.to_string(), "3600 or more")),
         };
     }
-    match if major >= 1 { view.i16(3505) } else { 0 } {
-        count @ 0.. => Ok(least + TEXT * count as u64),
-        -1 => {
-            source.seek(SeekFrom::Start(least)).map_err(ReadReason::Io)?;
-            let mut text = vec![0; TEXT as usize];
-            for count in 1..=MOST_TEXTS {
-                let is_whole = stream::fill(source, &mut text)? == text.len();
-                if END.iter().any(|end| text.windows(end.len()).any(|at| at == *end)) {
-                    return Ok(least + TEXT * count);
-                }
-                if !is_whole {
-                    break;
-                }
-            }
-            Err(wrong("extended textual headers", "without an end".into(), "((SEG: EndText))"))
-        }
+    let after = |count: i16| least + TEXT * u64::from(count.unsigned_abs());
+    match view.i16(3505) {
+        // revision 0 knows of none, but some programs write them
+        count @ 1.. if major == 0 => Ok(vec![least, after(count)]),
+        _ if major == 0 => Ok(vec![least]),
+        count @ 0.. => Ok(vec![after(count)]),
+        -1 => Ok(vec![end_of_texts(source)?]),
         odd => Err(wrong("extended textual headers", odd.to_string(), "a count, or -1")),
     }
+}
+
+/// The end of the textual headers where words say which is the last.
+fn end_of_texts<R: Read + Seek>(source: &mut R) -> Result<u64, ReadReason> {
+    let least = TEXT + BINARY as u64;
+    source.seek(SeekFrom::Start(least)).map_err(ReadReason::Io)?;
+    let mut text = vec![0; TEXT as usize];
+    for count in 1..=MOST_TEXTS {
+        let is_whole = stream::fill(source, &mut text)? == text.len();
+        if END.iter().any(|end| text.windows(end.len()).any(|at| at == *end)) {
+            return Ok(least + TEXT * count);
+        }
+        if !is_whole {
+            break;
+        }
+    }
+    Err(wrong("extended textual headers", "without an end".into(), "((SEG: EndText))"))
+}
+
+/// How many additional headers a trace may have, the number by the file's own revision first: 2.0 has it in four bytes,
+/// 2.1 in the first two of them; and what that one says.
+fn extras(view: &Fields<'_>, [major, minor]: [u8; 2]) -> Result<(Vec<usize>, i64), ReadReason> {
+    if major < 2 {
+        return Ok((vec![0], 0));
+    }
+    let mut counts = [view.i32(3507), view.i16(3507).into()];
+    if minor > 0 {
+        counts.reverse();
+    }
+    let all = counts.iter().filter_map(|&n| usize::try_from(n).ok().filter(|n| *n <= 100));
+    let mut all: Vec<usize> = all.collect();
+    all.dedup();
+    if all.is_empty() {
+        return Err(wrong(
+            "additional trace headers",
+            counts[0].to_string(),
+            "a count from 0 to 100",
+        ));
+    }
+    Ok((all, counts[0].into()))
 }
 
 /// Samples of a trace: revision 2's wide count, else the narrow one, else the first trace's.

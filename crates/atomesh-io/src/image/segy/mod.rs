@@ -26,7 +26,7 @@ use super::error::ReadReason;
 use super::format::ImageFormat;
 use super::memory::Memory;
 use super::note::{LoadedImage, ReadNote};
-use super::options::{SegyOptions, Vertical};
+use super::options::{Duplicates, SegyOptions, Vertical};
 use super::traces::{self, TraceLayout};
 
 mod coordinates;
@@ -36,6 +36,7 @@ mod grid;
 mod header;
 mod line;
 mod live;
+pub(super) mod su;
 mod survey;
 #[cfg(test)]
 mod tests;
@@ -61,25 +62,34 @@ const TRACE_BYTES: [usize; 2] = [189, 193];
 /// receiver.
 const COORDINATE_BYTES: [[usize; 2]; 3] = [[181, 185], [73, 77], [81, 85]];
 
-impl SegyOptions {
-    fn trace_bytes(&self) -> [usize; 2] {
-        self.trace_bytes.unwrap_or(TRACE_BYTES)
-    }
+/// Where numbers and coordinates of traces are looked for, and which trace of several with the same numbers counts.
+struct Places<'a> {
+    /// The first bytes of the inline and the crossline number; none if headers have no place for them.
+    numbers: Option<[usize; 2]>,
+    /// The first bytes of X and Y.
+    coordinates: &'a [[usize; 2]],
+    /// Whether trace headers have a scalar for times.
+    has_time_scalar: bool,
+    duplicates: Option<Duplicates>,
+}
 
-    fn coordinate_bytes(&self) -> &[[usize; 2]] {
-        match &self.coordinate_bytes {
+impl<'a> Places<'a> {
+    /// Those of options. Every number must lie in a trace header of 240 bytes.
+    fn of(options: &'a SegyOptions) -> Result<Self, ReadReason> {
+        let all = [options.trace_bytes, options.coordinate_bytes];
+        if let Some(byte) = all.into_iter().flatten().flatten().find(|at| !(1..=237).contains(at)) {
+            return Err(ReadReason::TraceByte { byte });
+        }
+        let coordinates = match &options.coordinate_bytes {
             Some(given) => std::slice::from_ref(given),
             None => &COORDINATE_BYTES,
-        }
-    }
-
-    /// Every number must lie in a trace header of 240 bytes.
-    fn check(&self) -> Result<(), ReadReason> {
-        let all = [self.trace_bytes, self.coordinate_bytes];
-        match all.into_iter().flatten().flatten().find(|at| !(1..=237).contains(at)) {
-            Some(byte) => Err(ReadReason::TraceByte { byte }),
-            None => Ok(()),
-        }
+        };
+        Ok(Self {
+            numbers: Some(options.trace_bytes.unwrap_or(TRACE_BYTES)),
+            coordinates,
+            has_time_scalar: true,
+            duplicates: options.duplicates,
+        })
     }
 }
 
@@ -92,15 +102,28 @@ fn wrong(field: &'static str, value: String, expected: &'static str) -> ReadReas
 fn read(source: Source) -> Result<LoadedImage, ReadReason> {
     let options = &source.options.segy;
     let Source { bytes: mut source, length: file_bytes, memory, .. } = source;
-    options.check()?;
-    let header = Header::read(&mut source, file_bytes, options.sample_format)?;
-    let mut heads = trace::read_headers(&mut source, &header, options, memory)?;
-    let mut notes = Vec::new();
+    let places = Places::of(options)?;
+    let header = Header::read(&mut source, file_bytes, options)?;
+    let heads = trace::read_headers(&mut source, &header, &places, memory)?;
+    let doubt = match options.sample_format {
+        None => doubt::doubt(&mut source, &header)?,
+        Some(_) => None,
+    };
+    image(&mut source, (header, heads), (options, &places), doubt, memory)
+}
+
+/// The image of traces whose headers were read, with their samples.
+fn image<R: Read + Seek>(
+    source: &mut R,
+    (header, mut heads): (Header, Vec<Trace>),
+    (options, of): (&SegyOptions, &Places<'_>),
+    doubt: Option<ReadNote>,
+    memory: Memory,
+) -> Result<LoadedImage, ReadReason> {
+    let mut notes = header.notes.clone();
     live::note_dead(&mut heads, &mut notes);
-    if options.sample_format.is_none() {
-        notes.extend(doubt::doubt(&mut source, &header)?);
-    }
-    let (survey, placement) = arranged(&heads, options, &mut notes)?;
+    notes.extend(doubt);
+    let (survey, placement) = arranged(&heads, of, &mut notes)?;
     let vertical = vertical(&header, &heads, options, &mut notes);
     let length = match (placement, header.is_in_feet) {
         (None, _) => "",
@@ -121,11 +144,11 @@ fn read(source: Source) -> Result<LoadedImage, ReadReason> {
     // frames are made first, so that what is wrong with them is reported before the long read
     let (image, units) = if survey.is_cube {
         let frame = cube_frame([nx, ny, header.samples], placement, vertical)?;
-        let samples = read_samples(&mut source, &header, &places, nx * ny, memory)?;
+        let samples = read_samples(source, &header, &places, nx * ny, memory)?;
         (AnyImage::Volume(image_of(frame, samples, absent)?), vec![length, length, depth])
     } else {
         let frame = line_frame([nx, header.samples], placement, vertical)?;
-        let samples = read_samples(&mut source, &header, &places, nx * ny, memory)?;
+        let samples = read_samples(source, &header, &places, nx * ny, memory)?;
         (AnyImage::Flat(image_of(frame, samples, absent)?), vec![length, depth])
     };
     let units = units.into_iter().map(String::from).collect();
@@ -148,12 +171,12 @@ fn image_of<const D: usize>(
 /// Arranges the traces, and places their grid if they have coordinates.
 fn arranged(
     traces: &[Trace],
-    options: &SegyOptions,
+    of: &Places<'_>,
     notes: &mut Vec<ReadNote>,
 ) -> Result<(Survey, Option<Placement>), ReadReason> {
-    let searched = options.coordinate_bytes();
+    let searched = of.coordinates;
     let coordinates = Coordinates::of(traces, searched);
-    let survey = Survey::arrange(traces, options, coordinates.as_ref().ok(), notes)?;
+    let survey = Survey::arrange(traces, of, coordinates.as_ref().ok(), notes)?;
     let coordinates = match coordinates {
         Ok(coordinates) => coordinates,
         Err(note) => {

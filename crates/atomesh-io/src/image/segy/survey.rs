@@ -2,11 +2,12 @@
 
 use super::super::error::ReadReason;
 use super::super::note::ReadNote;
-use super::super::options::SegyOptions;
+use super::super::options::Duplicates;
 use super::super::traces::NOWHERE;
 use super::coordinates::Coordinates;
 use super::grid::Grid;
 use super::trace::Trace;
+use super::{Places, TRACE_BYTES};
 
 /// The most places for each trace that is there. A survey of irregular outline fills a third of its
 /// grid or more; fewer traces than this say that the numbers are not what they are taken for.
@@ -86,23 +87,25 @@ impl Survey {
     /// make a grid, else as a line.
     pub fn arrange(
         traces: &[Trace],
-        options: &SegyOptions,
+        of: &Places<'_>,
         coordinates: Option<&Coordinates>,
         notes: &mut Vec<ReadNote>,
     ) -> Result<Self, ReadReason> {
         let numbers = |of: fn(&Trace) -> i32| Numbers::of(traces.iter().map(of));
         let (x, y) = (numbers(|t| t.crossline), numbers(|t| t.inline));
-        let [inline, crossline] = options.trace_bytes();
+        let [inline, crossline] = of.numbers.unwrap_or(TRACE_BYTES);
         if x.count > 1 && y.count > 1 && inline != crossline {
-            return Self::cube(traces, [x, y], notes);
+            return Self::cube(traces, [x, y], of.duplicates, notes);
         }
         let is_guess = x.count == 1 && y.count == 1 && inline != crossline;
         if is_guess && let Some(grid) = coordinates.and_then(Grid::of) {
-            return Self::by_position(traces.len(), grid, notes);
+            return Self::by_position(traces, grid, of.duplicates, notes);
         }
         let mut numbered = NUMBERINGS.iter().map(|&numbering| (numbering, numbers(numbering.of)));
         let line = match numbered.find(|(_, numbers)| numbers.count > 1) {
-            Some((numbering, numbers)) => Self::line(traces, numbering, numbers, notes)?,
+            Some((numbering, numbers)) => {
+                Self::line(traces, (numbering, numbers), of.duplicates, notes)?
+            }
             None => {
                 let numbers = "not numbered, a line in the order of the file".into();
                 notes.push(ReadNote::Traces { count: traces.len(), numbers });
@@ -115,24 +118,27 @@ impl Survey {
 
     /// A grid that coordinates tell.
     fn by_position(
-        trace_count: usize,
+        traces: &[Trace],
         grid: Grid,
+        duplicates: Option<Duplicates>,
         notes: &mut Vec<ReadNote>,
     ) -> Result<Self, ReadReason> {
-        let shape = grid.shape;
+        let (shape, trace_count) = (grid.shape, traces.len());
         notes.push(ReadNote::TracesByPosition { count: trace_count, shape });
         let mut places = vec![NOWHERE; trace_count];
         grid.places.iter().for_each(|&(trace, place)| places[trace] = place);
         let name = |place: usize| {
             format!("row {}, column {} by X and Y", place / shape[0], place % shape[0])
         };
-        Self { shape, is_cube: true, places, is_guess: false }.checked(name, notes)
+        Self { shape, is_cube: true, places, is_guess: false }
+            .checked(traces, name, duplicates, notes)
     }
 
     /// Crosslines along x, inlines along y.
     fn cube(
         traces: &[Trace],
         [x, y]: [Numbers; 2],
+        duplicates: Option<Duplicates>,
         notes: &mut Vec<ReadNote>,
     ) -> Result<Self, ReadReason> {
         let shape = [x.count, y.count];
@@ -145,14 +151,15 @@ impl Survey {
             format!("inline {inline}, crossline {crossline}")
         };
         let places = traces.iter().map(place).collect();
-        Self { shape, is_cube: true, places, is_guess: false }.checked(name, notes)
+        Self { shape, is_cube: true, places, is_guess: false }
+            .checked(traces, name, duplicates, notes)
     }
 
     /// Numbered traces along x.
     fn line(
         traces: &[Trace],
-        numbering: Numbering,
-        numbers: Numbers,
+        (numbering, numbers): (Numbering, Numbers),
+        duplicates: Option<Duplicates>,
         notes: &mut Vec<ReadNote>,
     ) -> Result<Self, ReadReason> {
         let Numbering { plural, of } = numbering;
@@ -165,25 +172,47 @@ impl Survey {
             format!("{singular} {}", numbers.number(place))
         };
         let places = traces.iter().map(|t| numbers.index(of(t))).collect();
-        Self { shape, is_cube: false, places, is_guess: false }.checked(name, notes)
+        Self { shape, is_cube: false, places, is_guess: false }
+            .checked(traces, name, duplicates, notes)
     }
 
-    /// The same if no two traces have one place; says which places have none.
+    /// The same if no two traces have one place, or with one trace at each; says which places have none. A dead
+    /// trace gives way to another.
     fn checked(
-        self,
+        mut self,
+        all: &[Trace],
         name: impl Fn(usize) -> String,
+        duplicates: Option<Duplicates>,
         notes: &mut Vec<ReadNote>,
     ) -> Result<Self, ReadReason> {
         const FREE: usize = usize::MAX;
         let mut traces = vec![FREE; self.trace_places()];
+        let mut left_out = Vec::new();
         for (trace, &place) in
             self.places.iter().enumerate().filter(|(_, place)| **place != NOWHERE)
         {
-            if traces[place] != FREE {
-                let (first, second) = (traces[place] + 1, trace + 1);
-                return Err(ReadReason::DuplicateTraces { first, second, number: name(place) });
+            let before = std::mem::replace(&mut traces[place], trace);
+            if before == FREE {
+                continue;
             }
-            traces[place] = trace;
+            let Some(duplicates) = duplicates else {
+                let (first, second) = (before + 1, trace + 1);
+                return Err(ReadReason::DuplicateTraces { first, second, number: name(place) });
+            };
+            let keeps_last = match (all[before].is_dead, all[trace].is_dead) {
+                (false, true) => false,
+                (true, false) => true,
+                _ => duplicates == Duplicates::Last,
+            };
+            if !keeps_last {
+                traces[place] = before;
+            }
+            left_out.push(if keeps_last { before } else { trace });
+        }
+        left_out.iter().for_each(|&trace| self.places[trace] = NOWHERE);
+        if let Some(first) = left_out.iter().min() {
+            let (count, is_last) = (left_out.len(), duplicates == Some(Duplicates::Last));
+            notes.push(ReadNote::DuplicateTraces { count, is_last, trace: first + 1 });
         }
         let missing = traces.iter().filter(|&&t| t == FREE).count();
         if let Some(first) = traces.iter().position(|&t| t == FREE) {

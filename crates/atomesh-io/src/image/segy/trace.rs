@@ -4,11 +4,10 @@ use std::io::{Read, Seek, SeekFrom};
 
 use super::super::error::ReadReason;
 use super::super::memory::Memory;
-use super::super::options::SegyOptions;
 use super::super::sample_type::ByteOrder;
 use super::super::stream;
-use super::COORDINATE_BYTES;
 use super::header::{Fields, Header, TRACE_HEADER};
+use super::{COORDINATE_BYTES, Places};
 
 /// What a trace says of itself.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
@@ -29,6 +28,8 @@ pub(super) struct Trace {
     pub time_scalar: i16,
     /// The sample interval as stored, 0 if the trace has none of its own.
     pub interval: u16,
+    /// The samples that the trace says that it has.
+    pub samples: u16,
     /// Whether the header says that there are no data.
     pub is_dead: bool,
 }
@@ -37,23 +38,24 @@ pub(super) struct Trace {
 const DEAD: [i16; 2] = [2, 3];
 
 impl Trace {
-    fn parse(bytes: &[u8; TRACE_HEADER], byte_order: ByteOrder, options: &SegyOptions) -> Self {
+    fn parse(bytes: &[u8; TRACE_HEADER], byte_order: ByteOrder, of: &Places<'_>) -> Self {
         let view = Fields { bytes, first: 1, byte_order };
-        let [inline, crossline] = options.trace_bytes();
+        let [inline, crossline] = of.numbers.map_or([0; 2], |at| at.map(|at| view.i32(at)));
         let mut places = [[0; 2]; COORDINATE_BYTES.len()];
-        for (place, [x, y]) in places.iter_mut().zip(options.coordinate_bytes()) {
+        for (place, [x, y]) in places.iter_mut().zip(of.coordinates) {
             *place = [view.i32(*x), view.i32(*y)];
         }
         Self {
-            inline: view.i32(inline),
-            crossline: view.i32(crossline),
+            inline,
+            crossline,
             ensemble: view.i32(21),
             places,
             scalar: view.i16(71),
             units: view.i16(89),
             delay: view.i16(109),
-            time_scalar: view.i16(215),
+            time_scalar: if of.has_time_scalar { view.i16(215) } else { 0 },
             interval: view.u16(117),
+            samples: view.u16(115),
             is_dead: DEAD.contains(&view.i16(29)),
         }
     }
@@ -93,7 +95,7 @@ fn scaled(value: f64, scalar: i16) -> f64 {
 pub(super) fn read_headers<R: Read + Seek>(
     source: &mut R,
     header: &Header,
-    options: &SegyOptions,
+    places: &Places<'_>,
     memory: Memory,
 ) -> Result<Vec<Trace>, ReadReason> {
     let mut traces = Vec::new();
@@ -105,7 +107,7 @@ pub(super) fn read_headers<R: Read + Seek>(
             return Err(cut_short(header, k));
         }
         memory.grow(&mut traces, 1, header.traces)?;
-        traces.push(Trace::parse(&bytes, header.byte_order, options));
+        traces.push(Trace::parse(&bytes, header.byte_order, places));
     }
     Ok(traces)
 }

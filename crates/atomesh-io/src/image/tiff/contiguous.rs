@@ -7,12 +7,12 @@ use ::tiff::decoder::ChunkType;
 use ::tiff::tags::{ByteOrder as TiffOrder, Tag};
 use atomesh::image::Samples;
 
+use super::super::channels::{append, mixed};
 use super::super::colour::Values;
 use super::super::error::ReadReason;
 use super::super::options::Meaning;
 use super::super::sample_type::ByteOrder;
 use super::super::stream::{self, Layout};
-use super::samples::{self, mixed};
 use super::{FORMAT, File, reason};
 
 /// Not compressed.
@@ -40,7 +40,8 @@ pub(super) fn read<R: Read + Seek>(
         let source = file.decoder.inner();
         source.seek(SeekFrom::Start(place)).map_err(ReadReason::Io)?;
         let stored = stream::read_samples(source, &layout)?;
-        samples::append(&mut volume, mixed(stored, &file.page, values)?, count, file.memory)?;
+        let plane = mixed(stored, file.page.channels(), values)?;
+        append(&mut volume, plane, count, file.memory)?;
     }
     volume.ok_or(ReadReason::Truncated { expected, found: 0 })
 }

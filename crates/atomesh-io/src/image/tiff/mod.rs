@@ -2,8 +2,9 @@
 //!
 //! Micrographs come as stacks of channels, slices and times. What ImageJ, OME-XML and `tifffile` say of them in the
 //! description of the first page is read (`imagej`, `ome`, `shaped`), and one channel and time of it is the image
-//! (`stack`). So is the size of samples, from there or from the resolution tags (`size`). Palettes are read where their
-//! indices are wanted, for which the decoder is shown another shade (`grey`). ImageJ writes stacks of more than 4 GB
+//! (`stack`). So is the size of samples, from there or from the resolution tags (`size`). Of palettes (`palette`) the
+//! decoder gives the indices, for which it is shown another shade (`grey`). What it does not decode, ZSTD and unusual
+//! orders of samples, `chunks` does. Thumbnails and other smaller pages are left out (`pages`). ImageJ writes stacks of more than 4 GB
 //! with a single directory, the planes of all pages behind its first sample: these are read by their place (`contiguous`).
 
 use std::io::{BufReader, Read, Seek};
@@ -14,6 +15,7 @@ use ::tiff::{ColorType, TiffError};
 use atomesh::image::{Frame, Image, Samples};
 
 use super::any_image::AnyImage;
+use super::channels::append;
 use super::codec::{Begins, Codec, Source};
 use super::colour::{Values, palette_note};
 use super::error::ReadReason;
@@ -23,11 +25,16 @@ use super::note::{LoadedImage, ReadNote};
 use super::options::Meaning;
 use super::shape::plausible_count;
 
+mod chunks;
 mod contiguous;
 mod grey;
 mod imagej;
 mod ome;
+mod packing;
 mod page;
+mod pages;
+mod palette;
+mod predict;
 mod samples;
 mod shaped;
 mod size;
@@ -36,6 +43,7 @@ mod write;
 
 use grey::Patched;
 use page::Page;
+use palette::Palette;
 use size::Resolution;
 use stack::Stack;
 
@@ -55,6 +63,14 @@ pub(super) const CODEC: Codec = Codec {
 /// by LZW and 1032 by deflate.
 const DENSITY: u64 = 4096;
 
+/// The same of ZSTD: a block of 128 KiB of one value takes 4 bytes.
+const ZSTD_DENSITY: u64 = 1 << 15;
+
+/// Samples that a byte of the file may stand for.
+fn density(page: &Page) -> u64 {
+    if page.is_zstd { ZSTD_DENSITY } else { DENSITY }
+}
+
 /// Memory that a part of a file may take, however small the file is: the decoder holds a palette of 16 bits, 3 · 2¹⁶
 /// numbers, in 6 MiB.
 const LEAST_ROOM: usize = 8 << 20;
@@ -63,7 +79,8 @@ const LEAST_ROOM: usize = 8 << 20;
 struct File<R: Read + Seek> {
     decoder: Decoder<Patched<R>>,
     page: Page,
-    page_count: usize,
+    /// The numbers, from 0, of the pages that are read.
+    pages: Vec<usize>,
     file_bytes: u64,
     memory: Memory,
 }
@@ -72,20 +89,21 @@ struct File<R: Read + Seek> {
 fn read(source: Source) -> Result<LoadedImage, ReadReason> {
     let mut values = Values::new(FORMAT, source.options.meaning);
     let bytes = BufReader::with_capacity(1 << 16, source.bytes);
-    let mut file = File::open(bytes, (source.length, source.memory), values.meaning)?;
-    let page = file.page;
     let mut notes = Vec::new();
-    file.first_page()?;
+    let mut file = File::open(bytes, (source.length, source.memory), &mut notes)?;
+    let page = file.page;
+    file.seek_to(0)?;
     let resolution = Resolution::of(&mut file.decoder);
     let description = page::description(&mut file.decoder).unwrap_or_else(|error| {
         let fault = error.to_string();
         notes.push(ReadNote::Description { source: "the image description", fault });
         String::new()
     });
-    let stack = Stack::of(&description, &page, file.page_count, &mut notes)?;
+    let stack = Stack::of(&description, &page, file.pages.len(), &mut notes)?;
     let planes = stack.chosen(&page, source.options.stack, &mut notes)?;
     let mut shape = vec![page.width, page.height];
-    shape.extend((planes.len() > 1).then_some(planes.len()));
+    let depth = page.depth * planes.len();
+    shape.extend((depth > 1).then_some(depth));
     let samples = match stack.is_contiguous {
         true => contiguous::read(&mut file, stack.plane_count(), &planes, &mut values)?,
         false => file.read(&planes, &mut values)?,
@@ -119,54 +137,52 @@ fn reason(error: TiffError) -> ReadReason {
 }
 
 impl<R: Read + Seek> File<R> {
-    /// Compares all pages.
+    /// Compares all pages, and leaves out those that are smaller than others.
     fn open(
         bytes: R,
         (file_bytes, memory): (u64, Memory),
-        meaning: Meaning,
+        notes: &mut Vec<ReadNote>,
     ) -> Result<Self, ReadReason> {
-        let wants_indices = meaning != Meaning::Brightness;
-        let mut decoder = Decoder::new(Patched::new(bytes)).map_err(reason)?;
-        let first = Page::of(&mut decoder, wants_indices)?;
-        plausible_count(&[first.width, first.height], file_bytes, DENSITY)?;
-        let mut page_count = 1;
-        while decoder.more_images() {
-            decoder.next_image().map_err(reason)?;
-            page_count += 1;
-            let page = Page::of(&mut decoder, wants_indices)?;
-            if page != first {
-                return Err(ReadReason::Page {
-                    page: page_count,
-                    found: page.text(),
-                    expected: first.text(),
-                });
+        let mut decoder =
+            Decoder::new(Patched::of(bytes).map_err(ReadReason::Io)?).map_err(reason)?;
+        let true_height = decoder.inner().height();
+        let mut pages = pages::Pages::default();
+        loop {
+            let mut page = Page::of(&mut decoder)?;
+            if let Some(height) = true_height.filter(|_| page.depth > 1) {
+                page.height = height;
             }
+            pages.push(page, page::is_copy(&mut decoder));
+            if !decoder.more_images() {
+                break;
+            }
+            decoder.next_image().map_err(reason)?;
         }
-        let count = plausible_count(&[first.width, first.height, page_count], file_bytes, DENSITY)?;
+        let (page, pages) = pages.largest(notes)?;
+        let shape = [page.width, page.height, page.depth, pages.len()];
+        let count = plausible_count(&shape, file_bytes, density(&page))?;
         let mut limits = Limits::default();
         limits.decoding_buffer_size = count.saturating_mul(4 * 8).max(LEAST_ROOM);
         limits.intermediate_buffer_size = limits.decoding_buffer_size.saturating_add(1 << 20);
         limits.ifd_value_size = usize::try_from(file_bytes).unwrap_or(usize::MAX).max(LEAST_ROOM);
         let decoder = decoder.with_limits(limits);
-        Ok(Self { decoder, page: first, page_count, file_bytes, memory })
+        Ok(Self { decoder, page, pages, file_bytes, memory })
     }
 
-    /// Goes back to the first page.
-    fn first_page(&mut self) -> Result<(), ReadReason> {
-        if self.page_count > 1 { self.decoder.seek_to_image(0).map_err(reason) } else { Ok(()) }
+    /// Goes to a page, by its place among those that are read.
+    fn seek_to(&mut self, plane: usize) -> Result<(), ReadReason> {
+        self.decoder.seek_to_image(self.pages[plane]).map_err(reason)
     }
 
     /// Decodes the pages of these numbers, one after another.
     fn read(&mut self, planes: &[usize], values: &mut Values) -> Result<Samples, ReadReason> {
         let page = self.page;
-        let shape = [page.width, page.height, planes.len()];
-        let count = plausible_count(&shape, self.file_bytes, DENSITY)?;
+        let shape = [page.width, page.height, page.depth, planes.len()];
+        let count = plausible_count(&shape, self.file_bytes, density(&page))?;
         self.memory.check(count as u128 * page.sample_bytes())?;
         let mut volume = None;
         for &plane in planes {
-            if self.page_count > 1 {
-                self.decoder.seek_to_image(plane).map_err(reason)?;
-            }
+            self.seek_to(plane)?;
             let samples = match page.color {
                 ColorType::Palette(_) => self.read_indices(plane, values)?,
                 _ => {
@@ -174,43 +190,41 @@ impl<R: Read + Seek> File<R> {
                         values.note(ReadNote::WhiteIsZero);
                         self.show_as_stored(plane)?;
                     }
-                    let decoded = self.decoder.read_image().map_err(reason)?;
-                    samples::samples(decoded, &page, values)?
+                    self.decode(values)?
                 }
             };
-            samples::append(&mut volume, samples, count, self.memory)?;
+            append(&mut volume, samples, count, self.memory)?;
         }
         volume.ok_or(ReadReason::Truncated { expected: count as u64, found: 0 })
     }
 
-    /// Decodes a page with a palette: its indices, or, where labels go by colour, its colours.
+    /// Decodes the page at which the decoder is, by what values mean.
+    fn decode(&mut self, values: &mut Values) -> Result<Samples, ReadReason> {
+        let page = &self.page;
+        if page.is_own() {
+            let stored = chunks::read(&mut self.decoder, page, self.memory)?;
+            return samples::of_stored(stored, page, values);
+        }
+        let decoded = self.decoder.read_image().map_err(reason)?;
+        samples::samples(decoded, page, values)
+    }
+
+    /// Decodes a page with a palette: its colours where they are wanted, else its indices.
     fn read_indices(&mut self, plane: usize, values: &mut Values) -> Result<Samples, ReadReason> {
         let map = self.decoder.get_tag_u16_vec(Tag::ColorMap).map_err(reason)?;
         self.show_as_stored(plane)?;
-        let decoded = self.decoder.read_image().map_err(reason)?;
-        // red of all indices comes first, then green, then blue
-        let count = map.len() / 3;
-        let colour = |index: usize| [0, 1, 2].map(|c| map.get(c * count + index).copied());
-        if values.meaning != Meaning::LabelsByColour {
-            let indices = samples::samples(decoded, &self.page, values)?;
-            let is_black = |index: usize| colour(index) == [Some(0); 3];
-            values.note(palette_note(&indices, values.meaning, is_black));
+        let palette = Palette::new(map);
+        if matches!(values.meaning, Meaning::Labels | Meaning::Mask) {
+            let indices = self.decode(values)?;
+            values.note(palette_note(&indices, values.meaning, |index| palette.is_black(index)));
             return Ok(indices);
         }
-        let mut indices = Values::new(FORMAT, Meaning::Labels);
-        let indices = samples::samples(decoded, &self.page, &mut indices)?;
-        let mut colours = Vec::with_capacity(3 * indices.len());
-        for place in 0..indices.len() {
-            let index = indices.get(place) as usize;
-            let colour = colour(index).map(|value| value.filter(|_| index < count));
-            let [Some(r), Some(g), Some(b)] = colour else {
-                let (field, value) = ("ColorMap", format!("of {count} colours, without {index}"));
-                let expected = "a colour for each index";
-                return Err(ReadReason::Header { format: FORMAT, field, value, expected });
-            };
-            colours.extend([r, g, b]);
+        let mut as_stored = Values::new(FORMAT, Meaning::Labels);
+        let indices = self.decode(&mut as_stored)?;
+        if values.meaning == Meaning::Brightness {
+            values.note(ReadNote::PaletteLuminance);
         }
-        values.of(colours, 3)
+        palette.colours(&indices, values, self.memory)
     }
 
     /// Makes the decoder give numbers as they are stored on the page at which it is.
@@ -218,7 +232,7 @@ impl<R: Read + Seek> File<R> {
         if let Some(directory) = self.decoder.ifd_pointer() {
             self.decoder.inner().make_grey(directory.0).map_err(ReadReason::Io)?;
         }
-        self.decoder.seek_to_image(plane).map_err(reason)
+        self.seek_to(plane)
     }
 }
 

@@ -3,9 +3,9 @@
 use ::tiff::decoder::DecodingResult;
 use atomesh::image::Samples;
 
-use super::super::colour::{Values, first_of, in_place, unpacked};
+use super::super::channels::{mixed, without_colour};
+use super::super::colour::{Values, unpacked};
 use super::super::error::ReadReason;
-use super::super::memory::Memory;
 use super::super::options::Meaning;
 use super::FORMAT;
 use super::page::Page;
@@ -28,39 +28,15 @@ pub(super) fn samples(
         DecodingResult::I16(v) => Samples::I16(v.into()),
         DecodingResult::I32(v) => Samples::I32(v.into()),
         DecodingResult::U64(v) => {
-            let doubles = without_colour(v, channels)?.iter().map(|&n| n as f64).collect();
+            let doubles = without_colour(v, channels, FORMAT)?.iter().map(|&n| n as f64).collect();
             return Ok(Samples::F64(doubles));
         }
         DecodingResult::I64(v) => {
-            let doubles = without_colour(v, channels)?.iter().map(|&n| n as f64).collect();
+            let doubles = without_colour(v, channels, FORMAT)?.iter().map(|&n| n as f64).collect();
             return Ok(Samples::F64(doubles));
         }
     };
-    mixed(stored, page, values)
-}
-
-/// One value of the channels of each sample of a page.
-pub(super) fn mixed(
-    stored: Samples,
-    page: &Page,
-    values: &mut Values,
-) -> Result<Samples, ReadReason> {
-    let channels = page.channels();
-    let is_float = matches!(stored, Samples::F32(_) | Samples::F64(_));
-    if is_float && channels >= 3 && values.meaning != Meaning::Brightness {
-        values.check_floats()?;
-    }
-    Ok(match stored {
-        Samples::U8(v) => return values.of(v.into_vec(), channels),
-        Samples::U16(v) => return values.of(v.into_vec(), channels),
-        Samples::U32(v) => return values.of(v.into_vec(), channels),
-        Samples::F32(v) => Samples::F32(grey_floats(v.into_vec(), channels).into()),
-        Samples::F64(v) => Samples::F64(grey_floats(v.into_vec(), channels).into()),
-        Samples::I8(v) => Samples::I8(without_colour(v.into_vec(), channels)?.into()),
-        Samples::I16(v) => Samples::I16(without_colour(v.into_vec(), channels)?.into()),
-        Samples::I32(v) => Samples::I32(without_colour(v.into_vec(), channels)?.into()),
-        other => other, // no other type is held
-    })
+    mixed(stored, channels, values)
 }
 
 /// Samples of fewer than 8 bits, each in a byte; of pictures they are stretched to its whole range.
@@ -73,73 +49,34 @@ fn whole_bytes(decoded: Vec<u8>, page: &Page, meaning: Meaning) -> Vec<u8> {
     unpacked(&decoded, page.width, bits).map(|value| value * factor).collect()
 }
 
-/// Grey samples without their opacity; colour is refused.
-fn without_colour<T: Copy>(interleaved: Vec<T>, channels: usize) -> Result<Vec<T>, ReadReason> {
-    match channels {
-        1 => Ok(interleaved),
-        2 => Ok(first_of::<2, T>(interleaved)),
-        _ => Err(ReadReason::Unsupported {
-            format: FORMAT,
-            found: "colour in signed integers or integers of 64 bits".into(),
-            expected: "colour in unsigned integers of 8 to 32 bits and in floats",
-        }),
-    }
-}
-
-/// Floats without their opacity, colour to Rec. 601 luminance.
-fn grey_floats<T>(interleaved: Vec<T>, channels: usize) -> Vec<T>
-where
-    T: Copy + Into<f64> + FromDouble,
-{
-    let luminance = |sample: &[T]| {
-        let [r, g, b] = [0, 1, 2].map(|c| sample[c].into());
-        T::from_double(0.299 * r + 0.587 * g + 0.114 * b)
+/// The samples of a page that were decoded here, one value each by what values mean: of pictures few bits are stretched,
+/// and shades turned round where 0 is white.
+pub(super) fn of_stored(
+    stored: Samples,
+    page: &Page,
+    values: &mut Values,
+) -> Result<Samples, ReadReason> {
+    let stored = match stored {
+        Samples::U8(v) => Samples::U8(whole_bytes(v.into_vec(), page, values.meaning).into()),
+        other => other,
     };
-    match channels {
-        2 => first_of::<2, T>(interleaved),
-        3 => in_place::<3, T>(interleaved, luminance),
-        4 => in_place::<4, T>(interleaved, luminance),
-        _ => interleaved,
-    }
+    let is_turned = page.is_white_zero && values.meaning == Meaning::Brightness;
+    let stored = if is_turned { turned(stored)? } else { stored };
+    mixed(stored, page.channels(), values)
 }
 
-/// A float that a double can be rounded to.
-trait FromDouble {
-    /// The nearest value.
-    fn from_double(value: f64) -> Self;
-}
-
-impl FromDouble for f32 {
-    fn from_double(value: f64) -> Self {
-        value as f32
-    }
-}
-
-impl FromDouble for f64 {
-    fn from_double(value: f64) -> Self {
-        value
-    }
-}
-
-/// Puts a plane behind those that are there; the first one is taken as it is.
-pub(super) fn append(
-    volume: &mut Option<Samples>,
-    plane: Samples,
-    count: usize,
-    memory: Memory,
-) -> Result<(), ReadReason> {
-    macro_rules! extend {
-        ($($kind:ident),*) => {
-            match (volume.as_mut(), plane) {
-                $((Some(Samples::$kind(all)), Samples::$kind(more)) => {
-                    let all = all.to_mut();
-                    memory.grow(all, more.len(), count)?;
-                    all.extend_from_slice(&more);
-                })*
-                (_, plane) => *volume = Some(plane), // pages of one type: only the first comes here
-            }
-        };
-    }
-    extend!(U8, I8, U16, I16, U32, I32, F32, F64);
-    Ok(())
+/// Shades from the other end of their range.
+fn turned(stored: Samples) -> Result<Samples, ReadReason> {
+    Ok(match stored {
+        Samples::U8(v) => Samples::U8(v.iter().map(|x| u8::MAX - x).collect()),
+        Samples::U16(v) => Samples::U16(v.iter().map(|x| u16::MAX - x).collect()),
+        Samples::U32(v) => Samples::U32(v.iter().map(|x| u32::MAX - x).collect()),
+        _ => {
+            return Err(ReadReason::Unsupported {
+                format: FORMAT,
+                found: "signed numbers or floats with 0 for white".into(),
+                expected: "unsigned integers there",
+            });
+        }
+    })
 }

@@ -81,7 +81,10 @@ impl Stack {
             Some(Err(fault)) => notes.push(ReadNote::Description { source: OME, fault }),
             None => {}
         }
-        match shaped::counts(description, [page.width, page.height]) {
+        if page.depth > 1 {
+            return Ok(Self::plain(page_count)); // all in one page
+        }
+        match shaped::counts(description, [page.width, page.height], page.planes()) {
             Some(Ok(counts)) => {
                 let planes = counts.planes().unwrap_or(usize::MAX);
                 let stack = Self::promised(counts, planes, page_count, (SHAPED, notes))?;

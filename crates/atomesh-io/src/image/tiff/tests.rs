@@ -49,8 +49,20 @@ fn pages_of_another_shape_or_type_are_named() {
     encoder.write_image::<Gray8>(3, 2, &[0; 6]).unwrap();
     encoder.write_image::<Gray8>(3, 2, &[0; 6]).unwrap();
     encoder.write_image::<Gray8>(2, 2, &[0; 4]).unwrap();
+    encoder.write_image::<Gray8>(2, 2, &[0; 4]).unwrap();
+    let small = load(bytes.get_ref(), StackOptions::default()).unwrap();
+    assert_eq!(small.image.shape(), [3, 2, 2]);
+    assert!(said(&small)[0].starts_with("2 of 4 pages are left out"), "{:?}", small.notes);
+    assert!(small.notes[0].is_warning());
+
+    // more pages of another shape are no thumbnails
+    let mut bytes = Cursor::new(Vec::new());
+    let mut encoder = TiffEncoder::new(&mut bytes).unwrap();
+    encoder.write_image::<Gray8>(3, 2, &[0; 6]).unwrap();
+    encoder.write_image::<Gray8>(2, 2, &[0; 4]).unwrap();
+    encoder.write_image::<Gray8>(2, 2, &[0; 4]).unwrap();
     let text = decode(bytes.get_ref()).unwrap_err().to_string();
-    assert!(text.starts_with("page 3 is 2 × 2") && text.contains("expected 3 × 2"), "{text}");
+    assert!(text.starts_with("page 1 is 3 × 2") && text.contains("expected 2 × 2"), "{text}");
 
     let mut bytes = Cursor::new(Vec::new());
     let mut encoder = TiffEncoder::new(&mut bytes).unwrap();
@@ -129,6 +141,9 @@ fn pages(width: u16, planes: &[&[u8]], more: &[Entry]) -> Vec<u8> {
         entries.push((279, 4, (plane.len() as u32).to_le_bytes().into()));
         entries.retain(|(tag, ..)| more.iter().all(|(other, ..)| other != tag));
         entries.extend(more.iter().cloned());
+        // a page of tiles has no strips
+        let is_tiled = more.iter().any(|(tag, ..)| *tag == 324);
+        entries.retain(|(tag, ..)| !(is_tiled && [273, 278, 279].contains(tag)));
         entries.sort_by_key(|(tag, ..)| *tag);
         let size = |kind: u16| [0, 1, 1, 2, 4, 8][usize::from(kind)];
         let mut places = Vec::new();
@@ -182,7 +197,7 @@ fn one_channel_and_time_of_a_stack_are_chosen() {
     let file = pages(1, &SIX, &[stack]);
     let refusal = load(&file, StackOptions::default()).unwrap_err().to_string();
     assert!(refusal.contains("2 channels and 1 times of 1 × 2 × 3 samples"), "{refusal}");
-    let channel = |n| load(&file, StackOptions { channel: Some(n), time: None });
+    let channel = |n| load(&file, StackOptions { channel: Some(n), ..StackOptions::default() });
     assert_eq!(firsts(&channel(1).unwrap()), [0.0, 2.0, 4.0]);
     assert_eq!(firsts(&channel(2).unwrap()), [1.0, 3.0, 5.0]);
     assert_eq!(said(&channel(2).unwrap()), ["channel 2 of 2"]);
@@ -191,7 +206,8 @@ fn one_channel_and_time_of_a_stack_are_chosen() {
     let times = text("ImageJ=1.53t\nimages=6\nframes=6\n");
     let file = pages(1, &SIX, &[times]);
     assert!(load(&file, StackOptions::default()).is_err());
-    let third = load(&file, StackOptions { time: Some(3), channel: Some(2) }).unwrap();
+    let third =
+        load(&file, StackOptions { time: Some(3), channel: Some(2), volume: None }).unwrap();
     assert_eq!((third.image.shape(), firsts(&third)), (vec![1, 2], vec![2.0]));
     let warning = said(&third).into_iter().find(|note| note.contains("channel 2 was asked for"));
     assert!(warning.is_some(), "{:?}", third.notes);
@@ -202,7 +218,7 @@ fn ome_and_tifffile_name_their_axes() {
     let ome = "<OME><Image><Pixels DimensionOrder='XYZCT' SizeX='1' SizeY='2' SizeC='2' SizeZ='3' \
                SizeT='1' PhysicalSizeX='0.5' PhysicalSizeY='0.5' PhysicalSizeZ='2'/></Image></OME>";
     let file = pages(1, &SIX, &[text(ome)]);
-    let second = load(&file, StackOptions { channel: Some(2), time: None }).unwrap();
+    let second = load(&file, StackOptions { channel: Some(2), ..StackOptions::default() }).unwrap();
     assert_eq!(firsts(&second), [3.0, 4.0, 5.0]);
     assert_eq!(
         (second.image.spacing(), &second.units[..]),
@@ -211,10 +227,10 @@ fn ome_and_tifffile_name_their_axes() {
     assert!(said(&second).contains(&"the spacing 0.5,0.5,2 um is that of the OME-XML".into()));
 
     let file = pages(1, &SIX, &[text(r#"{"shape": [3, 2, 2, 1], "axes": "ZCYX"}"#)]);
-    let second = load(&file, StackOptions { channel: Some(2), time: None }).unwrap();
+    let second = load(&file, StackOptions { channel: Some(2), ..StackOptions::default() }).unwrap();
     assert_eq!(firsts(&second), [1.0, 3.0, 5.0]);
     let file = pages(1, &SIX, &[text(r#"{"shape": [2, 3, 2, 1], "axes": "CZYX"}"#)]);
-    let second = load(&file, StackOptions { channel: Some(2), time: None }).unwrap();
+    let second = load(&file, StackOptions { channel: Some(2), ..StackOptions::default() }).unwrap();
     assert_eq!(firsts(&second), [3.0, 4.0, 5.0]);
     let file = pages(1, &SIX, &[text(r#"{"shape": [3, 2, 2, 1]}"#)]);
     assert!(load(&file, StackOptions::default()).unwrap_err().to_string().contains("[3, 2]"));
@@ -325,12 +341,123 @@ fn labels_of_a_palette_are_its_indices() {
         .flat_map(u16::to_le_bytes)
         .collect();
     let file = pages(1, &[&[0, 1], &[2, 1]], &[short(262, 3), (320, 3, map)]);
-    assert!(decode(&file).is_err(), "a picture");
+    let picture = load(&file, StackOptions::default()).unwrap();
+    // Rec. 601 of 255 red, 130 green and 255 blue
+    assert_eq!(*picture.image.samples(), Samples::U8(vec![76, 76, 29, 76].into()));
+    assert_eq!(picture.notes, [ReadNote::PaletteLuminance]);
     let labels = meant(&file, Meaning::Labels).unwrap();
     assert_eq!(*labels.image.samples(), Samples::U8(vec![0, 1, 2, 1].into()));
     assert_eq!(labels.notes, [ReadNote::PaletteIndices { is_black_elsewhere: false }]);
     let colours = meant(&file, Meaning::LabelsByColour).unwrap();
     assert_eq!(*colours.image.samples(), Samples::U32(vec![3, 2, 1, 2].into()));
+}
+
+/// Whole numbers of a tag, of 4 bytes each.
+fn longs(tag: u16, values: &[u32]) -> Entry {
+    (tag, 4, values.iter().flat_map(|n| n.to_le_bytes()).collect())
+}
+
+/// Bits of three channels, or two.
+fn bits(channels: usize) -> Entry {
+    (258, 3, [8, 0].repeat(channels))
+}
+
+#[test]
+fn channels_in_planes_are_those_that_are_together() {
+    let colours: [[u8; 3]; 4] = [[255, 0, 0], [0, 255, 0], [0, 0, 255], [9, 80, 200]];
+    let planes: Vec<u8> = (0..3).flat_map(|c| colours.map(|colour| colour[c])).collect();
+    let (rows, per_strip) = (short(257, 2), short(278, 2));
+    let parted = pages(
+        2,
+        &[&planes],
+        &[
+            rows.clone(),
+            per_strip.clone(),
+            bits(3),
+            short(262, 2),
+            short(277, 3),
+            short(284, 2),
+            longs(273, &[8, 12, 16]),
+            longs(279, &[4, 4, 4]),
+        ],
+    );
+    let together = pages(
+        2,
+        &[colours.as_flattened()],
+        &[rows, per_strip, bits(3), short(262, 2), short(277, 3)],
+    );
+    let luminance = decode(&together).unwrap();
+    assert_eq!(decode(&parted).unwrap().samples(), luminance.samples());
+    for meaning in [Meaning::LabelsByColour, Meaning::Mask] {
+        let of = |file: &[u8]| meant(file, meaning).unwrap().image.samples().clone();
+        assert_eq!(of(&parted), of(&together), "{meaning:?}");
+    }
+    assert!(meant(&parted, Meaning::Labels).is_err());
+    for length in 8..parted.len() {
+        let _ = decode(&parted[..length]);
+    }
+}
+
+#[test]
+fn opacity_of_grey_does_not_count() {
+    let rest = [short(257, 2), short(278, 2), bits(2), short(277, 2)];
+    let entries = |kind: u16| [&rest[..], &[short(338, kind)]].concat();
+    let plane: &[u8] = &[1, 99, 2, 98, 3, 97, 4, 96];
+    let grey = decode(&pages(2, &[plane], &entries(2))).unwrap();
+    assert_eq!(*grey.samples(), Samples::U8(vec![1, 2, 3, 4].into()));
+    // a second channel of anything else is none of opacity
+    let text = decode(&pages(2, &[plane], &entries(0))).unwrap_err().to_string();
+    assert!(text.contains("2 channels of 8 bits"), "{text}");
+}
+
+#[test]
+fn zstd_is_unpacked_and_not_beyond_the_page() {
+    let plane: Vec<u8> = (0..200).map(|k| k / 3).collect();
+    let level = ruzstd::encoding::CompressionLevel::Fastest;
+    let packed = ruzstd::encoding::compress_to_vec(&plane[..], level);
+    let entries = [short(257, 10), short(278, 10), short(259, 50_000)];
+    let file = pages(20, &[&packed], &entries);
+    assert_eq!(*decode(&file).unwrap().samples(), Samples::U8(plane.into()));
+    let taller = [short(257, 11), short(278, 11), short(259, 50_000)];
+    assert!(decode(&pages(20, &[&packed], &taller)).is_err());
+    let labels = [&entries[..], &[short(262, 0)]].concat();
+    let white = pages(20, &[&packed], &labels);
+    assert_eq!(decode(&white).unwrap().samples().get(0), 255.0);
+    assert_eq!(meant(&white, Meaning::Labels).unwrap().image.samples().get(0), 0.0);
+    for at in 8..packed.len() {
+        let mut broken = file.clone();
+        broken[at] ^= 0x55;
+        let _ = decode(&broken);
+    }
+}
+
+#[test]
+fn tiles_with_a_depth_are_a_volume() {
+    // 17 × 3 × 3 samples in tiles of 16 × 16 × 2: two across and two deep
+    let value = |x: usize, y: usize, z: usize| (x + 20 * y + 80 * z) as u8;
+    let mut tiles = Vec::new();
+    for tile in 0..4 {
+        for at in 0..512 {
+            let (x, y, z) = (tile % 2 * 16 + at % 16, at / 16 % 16, tile / 2 * 2 + at / 256);
+            tiles.push(if x < 17 && y < 3 && z < 3 { value(x, y, z) } else { 77 });
+        }
+    }
+    let entries = [
+        short(257, 3),
+        short(322, 16),
+        short(323, 16),
+        longs(32_997, &[3]),
+        longs(32_998, &[2]),
+        longs(324, &[8, 520, 1032, 1544]),
+        longs(325, &[512; 4]),
+    ];
+    let file = pages(17, &[&tiles], &entries);
+    let image = decode(&file).unwrap();
+    assert_eq!(image.shape(), [17, 3, 3]);
+    let expected: Vec<u8> = (0..153).map(|k| value(k % 17, k / 17 % 3, k / 51)).collect();
+    assert_eq!(*image.samples(), Samples::U8(expected.into()));
+    let absurd = [&entries[..6], &[longs(325, &[512; 4]), longs(322, &[1 << 20])]].concat();
+    assert!(decode(&pages(17, &[&tiles], &absurd[1..])).is_err());
 }
 
 #[test]

@@ -6,6 +6,7 @@ use super::super::loaded::AnyMesh;
 use super::super::metadata::{self, Metadata};
 use super::super::parts::Parts;
 use super::super::read_error::{MeshReadError, excerpt, malformed};
+use super::words::Words;
 
 /// Reads the triangles or tetrahedra of a legacy VTK file.
 ///
@@ -13,11 +14,15 @@ use super::super::read_error::{MeshReadError, excerpt, malformed};
 /// [`MeshReadError`] if the bytes are not such a file. No count in the file makes this allocate more
 /// than a multiple of the file's size.
 pub fn read_vtk(bytes: &[u8]) -> Result<AnyMesh, MeshReadError> {
-    let mut reader =
-        Reader { bytes, at: 0, binary: false, values_at: None, cells: Cells::default() };
+    let mut reader = Reader {
+        words: Words { bytes, at: 0 },
+        binary: false,
+        values_at: None,
+        cells: Cells::default(),
+    };
     let mut parts = Parts::default();
     reader.head()?;
-    while let Some(keyword) = reader.keyword()? {
+    while let Some(keyword) = reader.words.keyword()? {
         reader.section(keyword, &mut parts)?;
     }
     reader.cells.add_to(&mut parts)?;
@@ -47,8 +52,7 @@ struct Cells {
 }
 
 struct Reader<'a> {
-    bytes: &'a [u8],
-    at: usize,
+    words: Words<'a>,
     binary: bool,
     values_at: Option<Values>,
     cells: Cells,
@@ -56,18 +60,9 @@ struct Reader<'a> {
 
 impl<'a> Reader<'a> {
     fn head(&mut self) -> Result<(), MeshReadError> {
-        if !self.bytes.starts_with(b"# vtk DataFile Version") {
-            return Err(malformed(0, "\"# vtk DataFile Version\"", excerpt(self.bytes, 0)));
-        }
-        self.line()?;
-        self.line()?; // the title
-        self.binary = match self.line()? {
-            "BINARY" => true,
-            "ASCII" => false,
-            other => return Err(malformed(self.at, "BINARY or ASCII before this", other)),
-        };
-        let dataset = self.keyword()?.unwrap_or("");
-        let kind = self.word()?;
+        self.binary = self.words.head()?;
+        let dataset = self.words.keyword()?.unwrap_or("");
+        let kind = self.words.word()?;
         if (dataset, kind) != ("DATASET", "UNSTRUCTURED_GRID") {
             let found = format!("{dataset} {kind}");
             let expected = "DATASET UNSTRUCTURED_GRID";
@@ -79,33 +74,33 @@ impl<'a> Reader<'a> {
     fn section(&mut self, keyword: &str, parts: &mut Parts) -> Result<(), MeshReadError> {
         match keyword {
             "POINTS" => {
-                let count = self.count()?;
-                let kind = self.word()?;
+                let count = self.words.count()?;
+                let kind = self.words.word()?;
                 let numbers = self.numbers(kind, count, 3)?;
                 parts.points = numbers.as_chunks::<3>().0.to_vec();
             }
             "CELLS" => self.cells()?,
             "CELL_TYPES" => {
-                let count = self.count()?;
+                let count = self.words.count()?;
                 self.cells.kinds = self.numbers("int", count, 1)?;
             }
-            "POINT_DATA" => self.values_at = Some(Values::Points(self.count()?)),
-            "CELL_DATA" => self.values_at = Some(Values::Cells(self.count()?)),
+            "POINT_DATA" => self.values_at = Some(Values::Points(self.words.count()?)),
+            "CELL_DATA" => self.values_at = Some(Values::Cells(self.words.count()?)),
             "FIELD" => self.field(parts)?,
             "SCALARS" => self.scalars(parts)?,
             "VECTORS" | "NORMALS" => self.skip_values(3, parts)?,
             "TENSORS" => self.skip_values(9, parts)?,
             "LOOKUP_TABLE" => {
-                self.word()?;
-                let count = self.count()?;
+                self.words.word()?;
+                let count = self.words.count()?;
                 let kind = if self.binary { "unsigned_char" } else { "float" };
                 self.numbers(kind, count, 4)?;
             }
-            "METADATA" => self.skip_metadata()?,
+            "METADATA" => self.words.skip_metadata()?,
             other => {
                 let found = format!("\"{}\"", other.escape_debug());
                 return Err(malformed(
-                    self.at,
+                    self.words.at,
                     "a section of an unstructured grid before this",
                     found,
                 ));
@@ -116,19 +111,23 @@ impl<'a> Reader<'a> {
 
     /// Cells as lists that begin with their length, or, since 5.0, as offsets and corners.
     fn cells(&mut self) -> Result<(), MeshReadError> {
-        let (first, second) = (self.count()?, self.count()?);
-        if self.accept("OFFSETS") {
-            let kind = self.word()?;
+        let (first, second) = (self.words.count()?, self.words.count()?);
+        if self.words.accept("OFFSETS") {
+            let kind = self.words.word()?;
             let offsets = self.numbers(kind, first, 1)?;
             self.cells.ends = offsets.iter().skip(1).map(|&end| end as usize).collect();
-            if !self.accept("CONNECTIVITY") {
-                return Err(malformed(self.at, "CONNECTIVITY", excerpt(self.bytes, self.at)));
+            if !self.words.accept("CONNECTIVITY") {
+                return Err(malformed(
+                    self.words.at,
+                    "CONNECTIVITY",
+                    excerpt(self.words.bytes, self.words.at),
+                ));
             }
-            let kind = self.word()?;
+            let kind = self.words.word()?;
             self.cells.corners = self.numbers(kind, second, 1)?;
             return Ok(());
         }
-        let before = self.at;
+        let before = self.words.at;
         let list = self.numbers("int", second, 1)?;
         let mut rest = &list[..];
         while let [length, tail @ ..] = rest {
@@ -143,15 +142,15 @@ impl<'a> Reader<'a> {
     }
 
     fn field(&mut self, parts: &mut Parts) -> Result<(), MeshReadError> {
-        self.word()?;
-        for _ in 0..self.count()? {
-            let mut name = self.word()?;
+        self.words.word()?;
+        for _ in 0..self.words.count()? {
+            let mut name = self.words.word()?;
             while name == "METADATA" {
-                self.skip_metadata()?; // of the array before
-                name = self.word()?;
+                self.words.skip_metadata()?; // of the array before
+                name = self.words.word()?;
             }
-            let (components, tuples) = (self.count()?, self.count()?);
-            let kind = self.word()?;
+            let (components, tuples) = (self.words.count()?, self.words.count()?);
+            let kind = self.words.word()?;
             let values = self.numbers(kind, tuples, components)?;
             if self.values_at.is_none() && name == metadata::NAME {
                 let text: Vec<u8> = values.iter().map(|&v| v as u8).collect();
@@ -163,14 +162,14 @@ impl<'a> Reader<'a> {
     }
 
     fn scalars(&mut self, parts: &mut Parts) -> Result<(), MeshReadError> {
-        let name = self.word()?;
-        let kind = self.word()?;
-        let components = match self.line()? {
+        let name = self.words.word()?;
+        let kind = self.words.word()?;
+        let components = match self.words.line()? {
             "" => 1,
-            n => n.parse().map_err(|_| malformed(self.at, "components before this", n))?,
+            n => n.parse().map_err(|_| malformed(self.words.at, "components before this", n))?,
         };
-        if self.accept("LOOKUP_TABLE") {
-            self.word()?;
+        if self.words.accept("LOOKUP_TABLE") {
+            self.words.word()?;
         }
         let values = self.numbers(kind, self.tuples()?, components)?;
         self.keep(parts, name, components, values);
@@ -178,8 +177,8 @@ impl<'a> Reader<'a> {
     }
 
     fn skip_values(&mut self, components: usize, parts: &mut Parts) -> Result<(), MeshReadError> {
-        parts.skip_field(self.word()?);
-        let kind = self.word()?;
+        parts.skip_field(self.words.word()?);
+        let kind = self.words.word()?;
         self.numbers(kind, self.tuples()?, components)?;
         Ok(())
     }
@@ -202,63 +201,8 @@ impl<'a> Reader<'a> {
     fn tuples(&self) -> Result<usize, MeshReadError> {
         match self.values_at {
             Some(Values::Points(n) | Values::Cells(n)) => Ok(n),
-            None => Err(malformed(self.at, "POINT_DATA or CELL_DATA before this", "none")),
+            None => Err(malformed(self.words.at, "POINT_DATA or CELL_DATA before this", "none")),
         }
-    }
-
-    fn rest(&self) -> &'a [u8] {
-        self.bytes.get(self.at..).unwrap_or_default()
-    }
-
-    /// The rest of the line, without blanks around it.
-    fn line(&mut self) -> Result<&'a str, MeshReadError> {
-        let rest = self.rest();
-        if rest.is_empty() {
-            return Ok("");
-        }
-        let length = rest.iter().position(|&b| b == b'\n').unwrap_or(rest.len());
-        let text = std::str::from_utf8(&rest[..length]);
-        let text =
-            text.map_err(|_| malformed(self.at, "a line of text", excerpt(self.bytes, self.at)))?;
-        self.at += (length + 1).min(rest.len());
-        Ok(text.trim())
-    }
-
-    /// Passes over lines up to an empty one.
-    fn skip_metadata(&mut self) -> Result<(), MeshReadError> {
-        self.line()?; // the keyword's own line
-        while !self.line()?.is_empty() {}
-        Ok(())
-    }
-
-    /// The next word, if there is one.
-    fn keyword(&mut self) -> Result<Option<&'a str>, MeshReadError> {
-        self.at += self.rest().iter().take_while(|b| b.is_ascii_whitespace()).count();
-        let rest = self.rest();
-        let length = rest.iter().take_while(|b| !b.is_ascii_whitespace()).count();
-        let word = std::str::from_utf8(&rest[..length]);
-        let word = word.map_err(|_| malformed(self.at, "a word", excerpt(self.bytes, self.at)))?;
-        self.at += length;
-        Ok((length > 0).then_some(word))
-    }
-
-    /// Passes over a word, if it comes next; what comes next may be binary.
-    fn accept(&mut self, word: &str) -> bool {
-        let blanks = self.rest().iter().take_while(|b| b.is_ascii_whitespace()).count();
-        let found = self.rest()[blanks..].starts_with(word.as_bytes());
-        if found {
-            self.at += blanks + word.len();
-        }
-        found
-    }
-
-    fn word(&mut self) -> Result<&'a str, MeshReadError> {
-        self.keyword()?.ok_or_else(|| malformed(self.at, "a word", "the end"))
-    }
-
-    fn count(&mut self) -> Result<usize, MeshReadError> {
-        let word = self.word()?;
-        word.parse().map_err(|_| malformed(self.at, "a count before this", word))
     }
 
     /// `tuples` · `components` numbers of VTK's type, as reals: integers are exact below 2^53.
@@ -270,20 +214,20 @@ impl<'a> Reader<'a> {
     ) -> Result<Vec<f64>, MeshReadError> {
         let too_many =
             |at| malformed(at, "numbers that fit the file", format!("{tuples} × {components}"));
-        let count = tuples.checked_mul(components).ok_or_else(|| too_many(self.at))?;
+        let count = tuples.checked_mul(components).ok_or_else(|| too_many(self.words.at))?;
         // in text, numbers take a digit and a blank
-        if count > self.rest().len() {
-            return Err(too_many(self.at));
+        if count > self.words.rest().len() {
+            return Err(too_many(self.words.at));
         }
         if !self.binary {
             return (0..count)
                 .map(|_| {
-                    let word = self.word()?;
-                    word.parse().map_err(|_| malformed(self.at, "a number before this", word))
+                    let word = self.words.word()?;
+                    word.parse().map_err(|_| malformed(self.words.at, "a number before this", word))
                 })
                 .collect();
         }
-        self.line()?; // the data begin on the next line
+        self.words.line()?; // the data begin on the next line
         match kind {
             "char" | "signed_char" | "vtktypeint8" => self.take::<i8>(count),
             "unsigned_char" | "vtktypeuint8" => self.take::<u8>(count),
@@ -304,11 +248,11 @@ impl<'a> Reader<'a> {
     }
 
     fn take<T: Number>(&mut self, count: usize) -> Result<Vec<f64>, MeshReadError> {
-        let bytes = count.checked_mul(T::SIZE).and_then(|size| self.rest().get(..size));
+        let bytes = count.checked_mul(T::SIZE).and_then(|size| self.words.rest().get(..size));
         let bytes = bytes.ok_or_else(|| {
-            malformed(self.at, format!("{count} numbers of {} bytes", T::SIZE), "the end")
+            malformed(self.words.at, format!("{count} numbers of {} bytes", T::SIZE), "the end")
         })?;
-        self.at += bytes.len();
+        self.words.at += bytes.len();
         Ok(bytes.chunks_exact(T::SIZE).map(|b| T::take(b, Endian::Big).real()).collect())
     }
 }

@@ -6,12 +6,11 @@
 
 use std::borrow::Cow;
 
-use flate2::read::ZlibDecoder;
 use rayon::prelude::*;
-use std::io::Read;
 
 use super::super::column::{Endian, Number};
 use super::super::read_error::{MeshReadError, excerpt, malformed};
+use super::compressor::Compressor;
 
 /// How the binary arrays of a file are laid out.
 #[derive(Clone, Copy, Debug)]
@@ -19,8 +18,8 @@ pub(crate) struct Layout {
     pub endian: Endian,
     /// Whether the words of headers have 8 bytes, not 4.
     pub wide_header: bool,
-    /// Whether blocks are compressed by zlib.
-    pub compressed: bool,
+    /// What blocks are compressed by, if they are.
+    pub compressor: Option<Compressor>,
 }
 
 /// Where the text or the bytes of an array begin.
@@ -185,9 +184,9 @@ impl Array<'_> {
 
     /// The bytes of a binary array without its header; `size` of them, if that is known.
     pub fn bytes(&self, size: Option<usize>) -> Result<Cow<'_, [u8]>, MeshReadError> {
-        match self.layout.compressed {
-            true => self.decompress(size).map(Cow::Owned),
-            false => self.uncompressed(size),
+        match self.layout.compressor {
+            Some(compressor) => self.decompress(compressor, size).map(Cow::Owned),
+            None => self.uncompressed(size),
         }
     }
 
@@ -214,7 +213,11 @@ impl Array<'_> {
         })
     }
 
-    fn decompress(&self, size: Option<usize>) -> Result<Vec<u8>, MeshReadError> {
+    fn decompress(
+        &self,
+        compressor: Compressor,
+        size: Option<usize>,
+    ) -> Result<Vec<u8>, MeshReadError> {
         let word = self.word_size();
         let count = self.words(1)?[0];
         if count == 0 {
@@ -237,22 +240,24 @@ impl Array<'_> {
             at += length;
         }
         let blocks: Result<Vec<Vec<u8>>, MeshReadError> =
-            blocks.par_iter().map(|(packed, size)| self.inflate(packed, *size)).collect();
+            blocks.par_iter().map(|(packed, size)| self.block(compressor, packed, *size)).collect();
         Ok(blocks?.concat())
     }
 
-    /// A zlib stream of exactly `size` bytes.
-    fn inflate(&self, packed: &[u8], size: usize) -> Result<Vec<u8>, MeshReadError> {
-        let mut out = Vec::new();
-        let limit = (size as u64).saturating_add(1);
-        let read = ZlibDecoder::new(packed).take(limit).read_to_end(&mut out);
-        match read {
-            Ok(n) if n == size => Ok(out),
-            Ok(_) => {
+    /// A block of exactly `size` bytes.
+    fn block(
+        &self,
+        compressor: Compressor,
+        packed: &[u8],
+        size: usize,
+    ) -> Result<Vec<u8>, MeshReadError> {
+        match compressor.unpack(packed, size) {
+            Ok(out) if out.len() == size => Ok(out),
+            Ok(out) => {
                 Err(self
                     .wrong(format!("a block of {size} bytes"), format!("{} or more", out.len())))
             }
-            Err(e) => Err(self.wrong("a zlib block", e.to_string())),
+            Err(e) => Err(self.wrong(format!("a block of {compressor}"), e)),
         }
     }
 

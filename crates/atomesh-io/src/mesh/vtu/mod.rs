@@ -3,6 +3,7 @@
 pub(crate) mod appended;
 pub(crate) mod array;
 mod broken;
+pub(crate) mod compressor;
 pub(crate) mod read;
 mod write;
 pub(crate) mod xml;

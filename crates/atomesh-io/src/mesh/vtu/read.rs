@@ -1,4 +1,4 @@
-//! Reading VTU: text, base64 and raw data, inline and appended, plain and compressed by zlib.
+//! Reading VTU: text, base64 and raw data, inline and appended, plain and compressed by zlib, LZ4 or LZMA.
 
 use super::super::column::Endian;
 use super::super::field::OwnedField;
@@ -8,6 +8,7 @@ use super::super::parts::Parts;
 use super::super::read_error::{MeshReadError, excerpt, malformed};
 use super::super::tags::RawTags;
 use super::array::{Array, Layout, Place};
+use super::compressor::{self, Compressor};
 use super::xml::{Event, Scanner, Tag, find};
 
 /// Reads the triangles or tetrahedra of a VTU file; of several pieces, all.
@@ -180,10 +181,12 @@ fn layout(root: &Tag, kind: &'static str) -> Result<Layout, MeshReadError> {
         Some(found) if found == kind => {}
         other => return unsupported("VTK file type", other.unwrap_or(""), kind),
     }
-    let compressed = match root.get("compressor") {
-        None | Some("") => false,
-        Some("vtkZLibDataCompressor") => true,
-        Some(other) => return unsupported("compressor", other, "vtkZLibDataCompressor or none"),
+    let compressor = match root.get("compressor") {
+        None | Some("") => None,
+        Some(name) => match Compressor::named(name) {
+            None => return unsupported("compressor", name, compressor::NAMES),
+            known => known,
+        },
     };
     let wide_header = match root.get("header_type") {
         None | Some("UInt32") => false,
@@ -195,7 +198,7 @@ fn layout(root: &Tag, kind: &'static str) -> Result<Layout, MeshReadError> {
         Some("BigEndian") => Endian::Big,
         Some(other) => return unsupported("byte order", other, "LittleEndian or BigEndian"),
     };
-    Ok(Layout { endian, wide_header, compressed })
+    Ok(Layout { endian, wide_header, compressor })
 }
 
 impl Appended {

@@ -1,6 +1,6 @@
 //! Files that contradict themselves, leave gaps, or say odd things.
 
-use super::super::super::{IntervalSource, SampleFormat};
+use super::super::super::{Duplicates, IntervalSource, SampleFormat};
 use super::*;
 
 /// A file whose trace headers can be changed.
@@ -310,4 +310,125 @@ fn samples_whose_bits_tell_nothing_are_doubted_if_they_are_large() {
     let loaded = load(&file).unwrap();
     assert!(warnings(&loaded)[0].contains("may be those of IEEE numbers too"));
     assert!(warnings(&Writer { code: 1, ..writer }.plain()).is_empty());
+}
+
+#[test]
+fn one_of_several_traces_with_the_same_numbers_is_kept() {
+    let mut writer = cube(5, 7);
+    let mut twice = writer.traces[17];
+    twice.value = 777.0;
+    writer.traces.push(twice);
+    let text = writer.load(&SegyOptions::default()).unwrap_err().to_string();
+    assert!(text.contains("traces 18 and 36"), "{text}");
+    for (duplicates, is_last) in [(Duplicates::First, false), (Duplicates::Last, true)] {
+        let options = SegyOptions { duplicates: Some(duplicates), ..SegyOptions::default() };
+        let loaded = writer.load(&options).unwrap();
+        assert_eq!(loaded.image.samples().get(17) == 777.0, is_last);
+        let trace = if is_last { 18 } else { 36 };
+        let note = ReadNote::DuplicateTraces { count: 1, is_last, trace };
+        assert!(loaded.notes.contains(&note), "{:?}", loaded.notes);
+        assert_eq!(loaded.image.absent(), None);
+        assert_eq!(loaded.image.spacing(), cube(5, 7).plain().image.spacing());
+    }
+    // a dead trace gives way, whichever it is
+    let dead = Changed::of(&writer).with(29, 2_i16.to_be_bytes(), |k| k == 35);
+    let segy = SegyOptions { duplicates: Some(Duplicates::Last), ..SegyOptions::default() };
+    let options = ReadOptions { segy, ..ReadOptions::default() };
+    let loaded = load_bytes(&dead.file, FORMAT, &options, &mut Silent).unwrap();
+    assert_ne!(loaded.image.samples().get(17), 777.0);
+}
+
+#[test]
+fn a_file_that_is_cut_short_is_read_up_to_its_last_whole_trace() {
+    let whole = cube(5, 7).bytes();
+    let cut = &whole[..whole.len() - 50];
+    let text = load(cut).unwrap_err().to_string();
+    assert!(text.contains("34 traces are whole and 210 bytes are left over"), "{text}");
+    let segy = SegyOptions { truncated: true, ..SegyOptions::default() };
+    let options = ReadOptions { segy, ..ReadOptions::default() };
+    let loaded = load_bytes(cut, FORMAT, &options, &mut Silent).unwrap();
+    assert_eq!(loaded.image.shape(), cube(5, 7).plain().image.shape());
+    let note = ReadNote::TruncatedTraces { found: 34, promised: None, rest: 210 };
+    assert_eq!(loaded.notes[0], note);
+    assert!(loaded.notes.iter().any(|n| matches!(n, ReadNote::MissingTraces { missing: 1, .. })));
+    assert!(load_bytes(&whole[..3700], FORMAT, &options, &mut Silent).is_err());
+}
+
+#[test]
+fn trace_headers_and_texts_are_counted_as_they_fill_the_file() {
+    let plain = cube(5, 7);
+    let values_of = |loaded: &LoadedImage| values(&loaded.image);
+    let expected = values_of(&plain.plain());
+    // revision 0 with two textual headers more
+    let texts = Writer { revision: 0, texts: 2, ..plain.clone() };
+    let loaded = texts.plain();
+    assert_eq!(values_of(&loaded), expected);
+    assert!(loaded.notes.contains(&ReadNote::CountedTexts { count: 2 }), "{:?}", loaded.notes);
+    // the same bytes where no such headers are: what they hold means nothing
+    let mut odd = Writer { revision: 0, ..plain.clone() }.bytes();
+    odd[3505] = 2;
+    assert_eq!(values_of(&load(&odd).unwrap()), expected);
+
+    // an additional trace header, as revisions 2.0 and 2.1 count it
+    let two = Writer { revision: 2, ..plain }.bytes();
+    let each = (two.len() - 3600) / 35;
+    for (minor, at, is_own) in
+        [(1, 3507, true), (0, 3509, true), (0, 3507, false), (1, 3509, false)]
+    {
+        let mut file = two[..3600].to_vec();
+        file[3501] = minor;
+        file[at] = 1;
+        for trace in two[3600..].chunks(each) {
+            file.extend(&trace[..240]);
+            file.extend([0; 240]);
+            file.extend(&trace[240..]);
+        }
+        let loaded = load(&file).unwrap();
+        assert_eq!(values_of(&loaded), expected, "{minor} {at}");
+        let note = ReadNote::OtherRevision { count: 1 };
+        assert_eq!(loaded.notes.contains(&note), !is_own, "{minor} {at}: {:?}", loaded.notes);
+    }
+}
+
+#[test]
+fn seismic_unix_is_read_in_either_order_of_bytes() {
+    for byte_order in [ByteOrder::Little, ByteOrder::Big] {
+        // numbers at places of their own: the header has none for them
+        let writer = Writer { byte_order, bytes: [9, 13, 73, 77], ..cube(5, 7) };
+        let mut file = writer.bytes()[3600..].to_vec();
+        let each = file.len() / 35;
+        let put = |file: &mut [u8], at: usize, number: u16| {
+            let bytes = if byte_order == ByteOrder::Big {
+                number.to_be_bytes()
+            } else {
+                number.to_le_bytes()
+            };
+            file[at - 1..at + 1].copy_from_slice(&bytes);
+        };
+        for trace in file.chunks_mut(each) {
+            put(trace, 115, 5);
+            put(trace, 117, 2000);
+            trace[180..184].copy_from_slice(&0.25f32.to_le_bytes()); // d1, and no X
+            put(trace, 215, 7); // no scalar of times
+        }
+        let load = |file: &[u8], segy: SegyOptions| {
+            let options = ReadOptions { segy, ..ReadOptions::default() };
+            load_bytes(file, su::CODEC.format, &options, &mut Silent)
+        };
+        let loaded = load(&file, SegyOptions::default()).unwrap();
+        assert_eq!(loaded.image.samples(), cube(5, 7).plain().image.samples(), "{byte_order:?}");
+        assert_eq!(loaded.image.spacing()[2], 2.0);
+        let numbered = SegyOptions { trace_bytes: Some([9, 13]), ..SegyOptions::default() };
+        assert_eq!(load(&file, numbered).unwrap().image.shape(), loaded.image.shape());
+        // cut short, and of other lengths
+        assert!(matches!(
+            load(&file[..file.len() - 1], SegyOptions::default()),
+            Err(ReadReason::TruncatedTraces { found: 34, .. })
+        ));
+        let whole = SegyOptions { truncated: true, ..SegyOptions::default() };
+        assert!(load(&file[..file.len() - 1], whole).is_ok());
+        put(&mut file[each..], 115, 4);
+        let text = load(&file, SegyOptions::default()).unwrap_err().to_string();
+        assert!(text.contains("4 in trace 2"), "{text}");
+    }
 }
