@@ -13,6 +13,9 @@ use super::options::GivenFrame;
 /// it they are sheared.
 const SHEAR: f64 = 1e-4;
 
+/// The same up to which sheared axes give way to the nearest ones at right angles, 0.1 degrees off.
+const LEAST_REFUSED: f64 = 1.75e-3;
+
 /// Which way the axes of a header's world point. Ours is RAS, x to the right, y to the front, z to the
 /// top of the head, wherever a header speaks of a body; other coordinates stand as they are.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -68,6 +71,48 @@ impl Affine {
             self.origin = self.origin.map(|x| if x.is_finite() { x } else { 0.0 });
         }
         self
+    }
+
+    /// A column, the step from one sample to the next along an axis.
+    fn column(&self, axis: usize) -> [f64; 3] {
+        std::array::from_fn(|r| self.matrix[r][axis])
+    }
+
+    /// The same with the nearest axes at right angles, where they are hardly sheared, and the note that says so.
+    pub fn squared(self, shape: &[usize]) -> (Self, Option<ReadNote>) {
+        let columns = [0, 1, 2].map(|axis| self.column(axis));
+        let lengths = columns.map(|column| dot(&column, &column).sqrt());
+        let axes = shape.len().min(3);
+        let unit: [[f64; 3]; 3] = std::array::from_fn(|c| columns[c].map(|x| x / lengths[c]));
+        let (mut worst, mut odd) = (SHEAR, None);
+        for first in 0..axes {
+            for second in first + 1..axes {
+                let cosine = dot(&unit[first], &unit[second]);
+                // of columns that are no vectors nothing is greater
+                if cosine.abs() > worst {
+                    (worst, odd) = (cosine.abs(), Some((first, second, cosine)));
+                }
+            }
+        }
+        let Some((first, second, cosine)) = odd.filter(|_| worst <= LEAST_REFUSED) else {
+            return (self, None);
+        };
+        let mut square = self;
+        for (c, column) in orthonormal_of(&unit[..axes]).into_iter().enumerate() {
+            (0..3).for_each(|r| square.matrix[r][c] = column[r] * lengths[c]);
+        }
+        let far: Vec<f64> = shape.iter().map(|&n| n.saturating_sub(1) as f64).collect();
+        let moved = (0..1 << axes).map(|corner| {
+            let along = |c: usize| if corner >> c & 1 == 1 { far[c] } else { 0.0 };
+            let shift = |r: usize| -> f64 {
+                (0..axes).map(|c| (square.matrix[r][c] - self.matrix[r][c]) * along(c)).sum()
+            };
+            let shift: [f64; 3] = std::array::from_fn(shift);
+            dot(&shift, &shift).sqrt()
+        });
+        let degrees = cosine.acos().to_degrees();
+        let distance = moved.fold(0.0, f64::max);
+        (square, Some(ReadNote::Sheared { first, second, degrees, distance }))
     }
 
     /// The same samples in our world. LPS is RAS turned by half about z, so that nothing is mirrored.
@@ -197,6 +242,20 @@ fn orthonormal<const D: usize>(columns: [[f64; D]; D]) -> [[f64; D]; D] {
     columns
 }
 
+/// The same for some of the world's three dimensions.
+fn orthonormal_of(columns: &[[f64; 3]]) -> Vec<[f64; 3]> {
+    match columns {
+        &[x, y] => {
+            // the third is across both, so that it stays out of the way
+            let z =
+                [x[1] * y[2] - x[2] * y[1], x[2] * y[0] - x[0] * y[2], x[0] * y[1] - x[1] * y[0]];
+            orthonormal([x, y, z])[..2].to_vec()
+        }
+        &[x, y, z] => orthonormal([x, y, z]).to_vec(),
+        others => others.to_vec(),
+    }
+}
+
 #[cfg(test)]
 mod tests {
     use super::super::nifti::rotation;
@@ -214,6 +273,30 @@ mod tests {
                 assert!((degrees - 45.0).abs() < 1e-12);
             }
             other => panic!("{other:?}"),
+        }
+    }
+
+    #[test]
+    fn a_small_shear_gives_way_to_the_nearest_axes() {
+        for (tilt, is_small) in [(5e-5, false), (2e-4, true), (1.7e-3, true), (2e-3, false)] {
+            let mut affine = Affine::scaling([1.0, 2.0, 3.0]);
+            affine.matrix[0][2] = 3.0 * tilt;
+            let (square, note) = affine.squared(&[5, 6, 11]);
+            let Some(note) = note.filter(|_| is_small) else {
+                assert_eq!((square, is_small), (affine, false), "{tilt}");
+                continue;
+            };
+            // each of the two axes turns by half of the angle
+            let half = tilt / 2.0;
+            assert!((square.matrix[0][2] - 3.0 * half).abs() < 1e-8);
+            assert!((square.matrix[2][0] + half).abs() < 1e-8);
+            assert!(frame(FORMAT, [5, 6, 11], square).is_ok());
+            let ReadNote::Sheared { first: 0, second: 2, degrees, distance } = note else {
+                panic!("{note:?}");
+            };
+            assert!((degrees - 90.0 + tilt.to_degrees()).abs() < 1e-6, "{degrees}");
+            let most = half * (30.0f64.powi(2) + 4.0f64.powi(2)).sqrt();
+            assert!((distance - most).abs() < 1e-6, "{distance} {most}");
         }
     }
 

@@ -131,6 +131,16 @@ pub enum ReadReason {
         /// The number of volumes.
         count: u64,
     },
+    /// Segments overlap and none was chosen, or one was asked for that is not there.
+    #[error("holds the segments {found}{}; expected one{}", overlap(*.layers), not_named(wanted.as_deref()))]
+    Segments {
+        /// The segments with their numbers, as in `1 bone, 2 skin`.
+        found: String,
+        /// The layers in which they are, 1 if they do not overlap.
+        layers: usize,
+        /// What was asked for.
+        wanted: Option<String>,
+    },
     /// Colours are to be labels.
     #[error(
         "{format} file holds colours; expected labels, as grey values or the indices of a palette"
@@ -329,6 +339,16 @@ fn beginning(head: &[u8]) -> String {
 /// What there is of memory.
 fn left(limit: Option<u64>) -> String {
     limit.map_or_else(String::new, |limit| format!(", of which {limit} are left"))
+}
+
+/// The name that was asked for, in a message.
+fn not_named(name: Option<&str>) -> String {
+    name.map_or_else(String::new, |name| format!(", not {name:?}"))
+}
+
+/// That segments overlap.
+fn overlap(layers: usize) -> &'static str {
+    if layers > 1 { ", which overlap" } else { "" }
 }
 
 /// What was asked for, in the message of a stack.

@@ -12,7 +12,7 @@
 //! | TIFF | tif tiff | integers, floats; many pages are a volume, or a stack of channels and times | spacing |
 //! | NPY | npy | every real type; arrays (y, x) or (z, y, x) | none |
 //! | NIfTI-1 | nii nii.gz | every real type; one volume | sform, else qform, else spacing |
-//! | DICOM | a folder of slices, dcm | integers, rescaled to float32 | LPS turned to RAS |
+//! | DICOM | a folder of slices, dcm | integers, rescaled to float32; packed ones too; frames, segments | LPS turned to RAS |
 //! | MetaImage | mha, mhd | every real type; zlib | LPS turned to RAS where the file speaks of a body |
 //! | NRRD | nrrd, nhdr | every real type; gzip, ascii | LPS, LAS turned to RAS; others as they are |
 //! | VTI | vti | every real type; zlib, base64, ascii | as it is |
@@ -85,6 +85,7 @@ mod pnm;
 mod raw;
 mod rsf;
 mod sample_type;
+mod scan_note;
 mod segy;
 mod series_error;
 mod shape;
@@ -110,6 +111,7 @@ pub use options::{
     GivenFrame, Meaning, RawLayout, ReadOptions, SegyOptions, StackOptions, Vertical,
 };
 pub use sample_type::{ByteOrder, SampleType, UnknownByteOrder, UnknownSampleType};
+pub use scan_note::ScanNote;
 pub use series_error::SeriesError;
 use table::extension;
 pub use traces::SampleFormat;

@@ -4,6 +4,7 @@ use std::fmt;
 use std::path::PathBuf;
 
 use super::any_image::AnyImage;
+use super::scan_note::ScanNote;
 use super::traces::SampleFormat;
 
 /// An image, and what its file says or leaves open about it.
@@ -291,6 +292,28 @@ pub enum ReadNote {
         /// Which numbers, as in `instance numbers`.
         numbers: &'static str,
     },
+    /// Axes that are hardly sheared gave way to the nearest ones at right angles.
+    Sheared {
+        /// The first axis of the worst pair, 0 for x.
+        first: usize,
+        /// The second axis of the pair.
+        second: usize,
+        /// The angle between the two in the file.
+        degrees: f64,
+        /// How far samples are moved at most, in world units.
+        distance: f64,
+    },
+    /// A segment of a segmentation was read: 1 inside, 0 outside.
+    Segment {
+        /// Its name.
+        name: String,
+        /// Its number, from 1.
+        number: usize,
+        /// How many there are.
+        count: usize,
+    },
+    /// What became of the slices of a scan.
+    Scan(ScanNote),
 }
 
 /// Where a sample interval stands.
@@ -337,6 +360,9 @@ impl ReadNote {
 
     /// Whether the image may be other than the user thinks: a warning, not a remark.
     pub fn is_warning(&self) -> bool {
+        if let Self::Scan(note) = self {
+            return note.is_warning();
+        }
         !matches!(
             self,
             Self::Traces { .. }
@@ -357,6 +383,8 @@ impl ReadNote {
                 | Self::UsualResolution { .. }
                 | Self::Chosen { .. }
                 | Self::AtDetector { .. }
+                | Self::Sheared { .. }
+                | Self::Segment { .. }
         )
     }
 
@@ -365,6 +393,8 @@ impl ReadNote {
         match self {
             Self::Traces { .. } | Self::Line { .. } | Self::Turned { .. } | Self::Cells => true,
             Self::Vertical { is_known, .. } | Self::Axes { is_known, .. } => *is_known,
+            Self::Segment { .. } => true,
+            Self::Scan(note) => note.is_remark(),
             _ => false,
         }
     }
@@ -498,6 +528,17 @@ impl fmt::Display for ReadNote {
                 f,
                 "slices have no position; they are in the order of their {numbers}, evenly spaced"
             ),
+            Self::Sheared { first, second, degrees, distance } => write!(
+                f,
+                "axes {} and {} meet at {degrees:.4} degrees in the file; the nearest ones at right angles \
+                 are taken, which moves samples by {distance:.4} at most",
+                ["x", "y", "z"][*first],
+                ["x", "y", "z"][*second]
+            ),
+            Self::Segment { name, number, count } => {
+                write!(f, "segment {number} of {count}, {name:?}: 1 inside, 0 outside")
+            }
+            Self::Scan(note) => note.fmt(f),
             _ => self.write_stack(f),
         }
     }

@@ -22,6 +22,12 @@ pub struct ReadOptions {
     pub meaning: Meaning,
     /// Which plane of a TIFF stack with several channels or times.
     pub stack: StackOptions,
+    /// The segment of a segmentation (DICOM), by its name or its number from 1: samples are 1 inside and 0
+    /// outside. Default: all of them as labels, which those that overlap cannot be.
+    pub segment: Option<String>,
+    /// The series of a folder of DICOM files, by its identifier (UID), its number or its description. Default: the only
+    /// one.
+    pub series: Option<String>,
     /// The parts of the frame that the caller gives, which a file need not state. Default: none.
     pub given: GivenFrame,
 }

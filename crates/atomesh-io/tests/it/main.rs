@@ -3,6 +3,7 @@
 mod cell_exports;
 mod cell_files;
 mod cell_values;
+mod dicom;
 mod flow_files;
 mod foam_mesh;
 mod hostile;

@@ -61,6 +61,14 @@ section! {
         /// TIFF stacks of several points of time: which one, from 1. Default: several are an error
         #[arg(long, value_name = "N", value_parser = count_in(1, "a number from 1"))]
         pub time: usize,
+        /// DICOM folders of several series: which one, by its UID, its number or its description. Default: several are an
+        /// error
+        #[arg(long, value_name = "SERIES")]
+        pub series: String,
+        /// Segmentations (DICOM): which segment, by its name or its number from 1; samples are 1 in it and 0
+        /// elsewhere. Default: all as labels; segments that overlap are an error
+        #[arg(long, value_name = "NAME|N")]
+        pub segment: String,
         /// Colour images as labels: one for each colour, black 0, the others from 1 by ascending red, green, blue.
         /// Default: false, colours are an error; grey values and indices of palettes are labels as they are
         #[arg(long, value_name = "BOOL", num_args = 0..=1, require_equals = true,
@@ -176,7 +184,18 @@ impl FrameOptions {
         };
         let (raw, memory_limit) = (self.raw_layout()?, memory::room());
         let meaning = Meaning::default();
-        Ok(ReadOptions { raw, segy, data_root, memory_limit, stack, given, meaning })
+        let (series, segment) = (self.series.clone(), self.segment.clone());
+        Ok(ReadOptions {
+            raw,
+            segy,
+            data_root,
+            memory_limit,
+            stack,
+            series,
+            segment,
+            given,
+            meaning,
+        })
     }
 
     /// How images are read whose values mean that; labels go by colour if that is asked for.

@@ -272,6 +272,12 @@ class FrameOptions(TypedDict, total=False):
         TIFF stacks of several channels: which one, from 1, as ImageJ counts. Default: several are an error.
     time : int
         TIFF stacks of several points of time: which one, from 1. Default: several are an error.
+    series : str
+        DICOM folders of several series: which one, by its UID, its number or its description. Default: several are an
+        error.
+    segment : str
+        Segmentations (DICOM): which segment, by its name or its number from 1; samples are 1 in it and 0 elsewhere.
+        Default: all as labels; segments that overlap are an error.
     labels_by_color : bool
         Colour images as labels: one for each colour, black 0, the others from 1 by ascending red, green, blue.
         Default: False, colours are an error; grey values and indices of palettes are labels as they are.
@@ -307,6 +313,8 @@ class FrameOptions(TypedDict, total=False):
     fill: float
     channel: int
     time: int
+    series: str
+    segment: str
     labels_by_color: bool
     shape: Sequence[int]
     dtype: str
