@@ -10,8 +10,9 @@ use super::super::memory::Memory;
 use super::super::note::LoadedImage;
 use super::super::options::{GivenFrame, ReadOptions};
 use super::super::scan_note::ScanNote;
+use super::choose::in_file;
 use super::frames::Frames;
-use super::header::Header;
+use super::header::{Found, Header};
 use super::is_dicom;
 use super::reader::Reader;
 use super::volume::{Scan, Wishes};
@@ -116,7 +117,7 @@ fn headers(
     names: Vec<PathBuf>,
     given: GivenFrame,
     watch: &mut dyn Watch,
-) -> Result<(Vec<(String, Header)>, usize), ReadReason> {
+) -> Result<(Vec<(String, Found)>, usize), ReadReason> {
     let (mut files, mut others) = (Vec::new(), 0);
     for (k, name) in names.iter().enumerate() {
         // a header is some kilobytes, a slice half a megabyte
@@ -124,19 +125,11 @@ fn headers(
         let text = name.to_string_lossy().into_owned();
         let header = header(&folder.join(name), given).map_err(|reason| in_file(&text, reason))?;
         match header {
-            Some(header) => files.push((text, header)),
+            Some(found) => files.push((text, found)),
             None => others += 1,
         }
     }
     Ok((files, others))
-}
-
-/// The error of a file in the folder.
-fn in_file(file: &str, reason: ReadReason) -> ReadReason {
-    match reason {
-        ReadReason::Cancelled(_) => reason,
-        _ => ReadReason::Slice { file: file.into(), reason: Box::new(reason) },
-    }
 }
 
 fn reader(path: &Path) -> Result<Reader<File>, ReadReason> {
@@ -146,12 +139,12 @@ fn reader(path: &Path) -> Result<Reader<File>, ReadReason> {
 }
 
 /// The header of an image; none if the file is not DICOM, or holds no image.
-fn header(path: &Path, given: GivenFrame) -> Result<Option<Header>, ReadReason> {
+fn header(path: &Path, given: GivenFrame) -> Result<Option<Found>, ReadReason> {
     if !is_dicom(path) {
         return Ok(None);
     }
     let mut reader = reader(path)?;
-    match Header::read(&mut reader, given) {
+    match Found::read(&mut reader, given) {
         // it only looked like a file whose preamble was left out
         Err(_) if reader.is_bare => Ok(None),
         read => read,

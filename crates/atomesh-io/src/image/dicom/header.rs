@@ -9,17 +9,23 @@ use super::super::affine::wrong;
 use super::super::error::ReadReason;
 use super::super::options::GivenFrame;
 use super::super::sample_type::ByteOrder;
-use super::data_set::{self, DataSet, PixelData};
+use super::data_set::{self, Content, DataSet, PixelData};
 use super::packing::Packing;
 use super::pixels::{Pixels, Scale, Table};
 use super::reader::Reader;
 use super::segments::Segmentation;
 use super::{FORMAT, tag, unsupported};
 
+/// A file that holds an image.
+pub(super) struct Found {
+    pub series: SeriesName,
+    /// Its header, or why the image cannot be read, which is of no interest if another series is.
+    pub header: Result<Header, ReadReason>,
+}
+
 /// The header of a file.
 #[derive(Debug)]
 pub(super) struct Header {
-    pub series: SeriesName,
     pub pixels: Pixels,
     /// Its frames, at least one.
     pub planes: Vec<Plane>,
@@ -61,47 +67,58 @@ pub(super) struct Plane {
     pub segment: Option<u16>,
 }
 
-impl Header {
+impl Found {
     /// Reads the header of an image; none if the file is sound and holds no image.
     pub fn read<R: Read + Seek>(
         reader: &mut Reader<R>,
         given: GivenFrame,
     ) -> Result<Option<Self>, ReadReason> {
         let content = data_set::read(reader)?;
-        let set = content.set;
+        let set = &content.set;
         let (Some(rows), Some(columns)) = (set.short(tag::ROWS), set.short(tag::COLUMNS)) else {
             return Ok(None);
         };
-        if set.has(tag::FLOAT_PIXELS) || set.has(tag::DOUBLE_PIXELS) {
-            return Err(unsupported("samples of floats", "integers"));
-        }
-        let packing = Packing::of(&set.text(tag::TRANSFER_SYNTAX).unwrap_or_default())?;
-        let pixels = Pixels::of(&set, [columns, rows])?;
-        let place =
-            content.pixels.ok_or_else(|| wrong(FORMAT, "pixel data", "missing", "samples"))?;
-        let frames = frame_count(&set)?;
-        check_size(&pixels, frames, place, packing, reader.file_bytes)?;
-        let segmentation = Segmentation::of(&set)?;
-        let planes = planes(&set, frames, &pixels, given)?;
         let text = |tag| set.text(tag).unwrap_or_default();
         let series = SeriesName {
             uid: text(tag::SERIES),
             number: text(tag::SERIES_NUMBER),
             description: text(tag::SERIES_DESCRIPTION),
         };
-        let (byte_order, is_bare) = (content.byte_order, reader.is_bare);
-        Ok(Some(Self {
-            series,
+        let header = Header::of(&content, [columns, rows], reader, given);
+        Ok(Some(Self { series, header }))
+    }
+}
+
+impl Header {
+    fn of<R>(
+        content: &Content,
+        shape: [u16; 2],
+        reader: &Reader<R>,
+        given: GivenFrame,
+    ) -> Result<Self, ReadReason> {
+        let set = &content.set;
+        if set.has(tag::FLOAT_PIXELS) || set.has(tag::DOUBLE_PIXELS) {
+            return Err(unsupported("samples of floats", "integers"));
+        }
+        let packing = Packing::of(&set.text(tag::TRANSFER_SYNTAX).unwrap_or_default())?;
+        let pixels = Pixels::of(set, shape)?;
+        let place =
+            content.pixels.ok_or_else(|| wrong(FORMAT, "pixel data", "missing", "samples"))?;
+        let frames = frame_count(set)?;
+        check_size(&pixels, frames, place, packing, reader.file_bytes)?;
+        let segmentation = Segmentation::of(set)?;
+        let planes = planes(set, frames, &pixels, given)?;
+        Ok(Self {
             pixels,
             planes,
             groups: set.items(tag::FRAME_GROUPS).len(),
             segmentation,
             packing,
-            byte_order,
+            byte_order: content.byte_order,
             place,
             deflated_from: reader.deflated_from(),
-            is_bare,
-        }))
+            is_bare: reader.is_bare,
+        })
     }
 }
 

@@ -49,7 +49,7 @@ mod tag;
 mod volume;
 
 use frames::Frames;
-use header::Header;
+use header::Found;
 use reader::Reader;
 use volume::{Scan, Wishes};
 
@@ -79,9 +79,9 @@ fn is_dicom(path: &Path) -> bool {
 fn read(source: Source) -> Result<LoadedImage, ReadReason> {
     let wishes = Wishes::of(source.options, source.memory);
     let mut reader = Reader::new(source.bytes, source.length);
-    let header = Header::read(&mut reader, wishes.given)?;
-    let header = header.ok_or_else(|| unsupported("no image", "a slice"))?;
-    let scan = Scan::new(vec![(String::new(), header)], 0, &wishes)?;
+    let found = Found::read(&mut reader, wishes.given)?;
+    let found = found.ok_or_else(|| unsupported("no image", "a slice"))?;
+    let scan = Scan::new(vec![(String::new(), found)], 0, &wishes)?;
     let mut frames = Frames::new(reader);
     scan.load(&wishes, &mut |header, (_, frame)| frames.values(header, frame, wishes.memory))
 }

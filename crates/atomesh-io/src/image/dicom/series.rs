@@ -104,11 +104,9 @@ impl Series {
             return missing(odd, "pixel spacing");
         }
         match lacks(|s| s.position.is_none()) {
-            Some(_) if given.spacing => return Self::by_number(slices, axes),
-            Some(odd) => return missing(odd, "image position"),
-            None if axes.is_none() && !given.direction => {
-                return missing(&head, "image orientation");
-            }
+            Some(_) if given.spacing => Self::by_number(slices, axes),
+            Some(odd) => missing(odd, "image position"),
+            None if axes.is_none() && !given.direction => missing(&head, "image orientation"),
             None => Self::by_place(slices, axes, given, has_gaps),
         }
     }

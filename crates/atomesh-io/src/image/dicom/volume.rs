@@ -12,10 +12,10 @@ use super::super::note::{LoadedImage, ReadNote};
 use super::super::options::{GivenFrame, Meaning, ReadOptions};
 use super::super::scan_note::ScanNote;
 use super::super::series_error::SeriesError;
-use super::choose::choose;
+use super::choose::{Chosen, choose};
 use super::flat::Flat;
 use super::grid::{Grid, Resampling};
-use super::header::Header;
+use super::header::{Found, Header};
 use super::pixels::{Pixels, Scale};
 use super::segments::{Labels, Segmentation, Stack};
 use super::series::{Series, Slice, slices};
@@ -59,15 +59,15 @@ pub(super) struct Scan {
 impl Scan {
     /// The files of the series that is wanted; `others` are files without an image.
     pub fn new(
-        files: Vec<(String, Header)>,
+        files: Vec<(String, Found)>,
         others: usize,
         wishes: &Wishes,
     ) -> Result<Self, ReadReason> {
-        let (files, count) = choose(files, wishes.series, others)?;
+        let Chosen { files, name, count } = choose(files, wishes.series, others)?;
         let mut notes = Vec::new();
         let (first, head) = &files[0];
         if count > 1 {
-            notes.push(ScanNote::Series { name: head.series.text(), count }.into());
+            notes.push(ScanNote::Series { name: name.text(), count }.into());
         }
         let bare: Vec<_> = files.iter().filter(|(_, header)| header.is_bare).collect();
         if let Some((file, _)) = bare.first() {

@@ -49,6 +49,25 @@ fn one_of_several_series_is_chosen_by_what_it_is_known_by() {
 }
 
 #[test]
+fn images_of_other_series_may_be_what_is_not_read() {
+    let mut files = three().to_vec();
+    let mut report = File::of([3, 2], &[9; 6], 0.0);
+    report.text(0x0020_000e, "UI", "1.2.9");
+    report.text(0x0028_0004, "CS", "RGB");
+    files.push(("report", report));
+    let folder = folder(whole(&files));
+    let read = |series: &str| {
+        let options = ReadOptions { series: Some(series.into()), ..ReadOptions::default() };
+        load_with(folder.path(), &options)
+    };
+    assert_eq!(read("1.2.3").unwrap().image.shape(), [3, 2, 3]);
+    let text = read("1.2.9").unwrap_err().to_string();
+    assert!(text.contains("report: DICOM file holds RGB samples"), "{text}");
+    let text = load(folder.path()).unwrap_err().to_string();
+    assert!(text.contains("several series"), "{text}");
+}
+
+#[test]
 fn slices_in_folders_below_are_read_and_the_folder_is_named() {
     let inner = |folder: &'static str, files: &[(&'static str, File)]| {
         let path = |name: &str| format!("{folder}/{name}");
