@@ -303,6 +303,18 @@ pub enum ReadNote {
         /// How far samples are moved at most, in world units.
         distance: f64,
     },
+    /// A single slice across z is flat, without the z of its place.
+    LevelSlice {
+        /// Its place.
+        z: f64,
+    },
+    /// A single slice is flat, in its own plane: x along its first axis, from its first sample.
+    ObliqueSlice {
+        /// The world coordinates of its first sample.
+        origin: [f64; 3],
+        /// The world directions of its axes.
+        axes: [[f64; 3]; 2],
+    },
     /// A segment of a segmentation was read: 1 inside, 0 outside.
     Segment {
         /// Its name.
@@ -384,6 +396,8 @@ impl ReadNote {
                 | Self::Chosen { .. }
                 | Self::AtDetector { .. }
                 | Self::Sheared { .. }
+                | Self::LevelSlice { .. }
+                | Self::ObliqueSlice { .. }
                 | Self::Segment { .. }
         )
     }
@@ -535,6 +549,23 @@ impl fmt::Display for ReadNote {
                 ["x", "y", "z"][*first],
                 ["x", "y", "z"][*second]
             ),
+            Self::LevelSlice { z } => {
+                write!(f, "a single slice is read as flat; it lies in the plane z = {z}")
+            }
+            Self::ObliqueSlice { origin, axes: [x, y] } => {
+                let listed = |numbers: &[f64; 3]| {
+                    let words: Vec<_> = numbers.iter().map(f64::to_string).collect();
+                    format!("({})", words.join(", "))
+                };
+                write!(
+                    f,
+                    "a single slice is read as flat, in its own plane: its first sample is at {} in the world, \
+                     its axes run along {} and {}",
+                    listed(origin),
+                    listed(x),
+                    listed(y)
+                )
+            }
             Self::Segment { name, number, count } => {
                 write!(f, "segment {number} of {count}, {name:?}: 1 inside, 0 outside")
             }

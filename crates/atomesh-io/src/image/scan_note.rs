@@ -53,6 +53,11 @@ pub enum ScanNote {
         /// The greatest gap.
         greatest: f64,
     },
+    /// The axes of a single slice are no unit vectors at right angles; those of the world are taken.
+    OddAxes {
+        /// The axes found.
+        axes: [[f64; 3]; 2],
+    },
     /// Slices of a segmentation that no frame is of.
     EmptySlices {
         /// How many.
@@ -90,6 +95,7 @@ impl ScanNote {
             | Self::Shifted { .. }
             | Self::Uneven { .. }
             | Self::GivenGaps { .. }
+            | Self::OddAxes { .. }
             | Self::MoreGroups { .. } => true,
             Self::Series { .. }
             | Self::NoPreamble { .. }
@@ -147,6 +153,10 @@ impl fmt::Display for ScanNote {
                 f,
                 "gaps between slices are {least} to {greatest} in the file; they are taken to be even, of the \
                  spacing that is given"
+            ),
+            Self::OddAxes { axes } => write!(
+                f,
+                "the axes {axes:?} are no unit vectors at right angles; those of the world are taken"
             ),
             Self::EmptySlices { empty, count } => {
                 write!(f, "{empty} of {count} slices have no frame; they are empty")

@@ -11,7 +11,7 @@
 //!
 //! Slices of a tilted gantry, and slices that stand nearly evenly, are resampled onto a grid, with a note. A single slice is
 //! a flat image; its frame is kept if the slice lies across z, and is its spacing alone if not, since a plane has no other
-//! place for it. The spacing of a radiograph may be known at the detector alone (imager pixel spacing); it is taken, with a
+//! place for it: a note says where it is. The spacing of a radiograph may be known at the detector alone (imager pixel spacing); it is taken, with a
 //! note. What the caller gives of the frame need not be in the files: slices without a position are put in the order of
 //! their instance numbers where the spacing is given.
 //!

@@ -237,10 +237,9 @@ fn assemble(
         Ok(volume.samples)
     };
     if series.slices.len() == 1 {
-        let flat = Flat::of(&series.slices[0].plane, shape, given);
-        let (affine, note) = flat.affine.squared(&shape);
-        let image = affine::image(FORMAT, &shape, affine, || straight(1))?;
-        return Ok(flat.loaded(image).noting(note));
+        let flat = Flat::of(&series.slices[0].plane, given);
+        let loaded = affine::placed(FORMAT, &shape, flat.affine, || straight(1))?;
+        return Ok(flat.noting(loaded));
     }
     let grid = Grid::of(series, shape, given)?;
     let affine = grid.affine.turned_from(WORLD).with_given(given);

@@ -191,3 +191,25 @@ fn what_the_caller_gives_is_not_looked_at_in_the_files() {
     assert_eq!(numbers(&loaded.image)[0], 20.0);
     assert!(loaded.notes.contains(&ReadNote::ByNumber { numbers: "files' names" }));
 }
+
+#[test]
+fn a_single_slice_says_where_it_is() {
+    let read = |axes: &str, height: f64| {
+        let mut file = File::of([3, 2], &[1, 2, 3, 4, 5, 6], height);
+        file.text(0x0020_0037, "DS", axes);
+        let folder = folder([("a.dcm", file.bytes())]);
+        load(&folder.path().join("a.dcm")).unwrap()
+    };
+    let level = read("1\\0\\0\\0\\1\\0", 7.0);
+    near(&level.image.origin(), &[-10.0, 20.0]);
+    assert!(level.notes.contains(&ReadNote::LevelSlice { z: 7.0 }), "{:?}", level.notes);
+    let upright = read("1\\0\\0\\0\\0\\-1", 7.0);
+    near(&upright.image.origin(), &[0.0, 0.0]);
+    let axes = [[-1.0, 0.0, 0.0], [0.0, 0.0, -1.0]];
+    let note = ReadNote::ObliqueSlice { origin: [-10.0, 20.0, 7.0], axes };
+    assert!(upright.notes.contains(&note), "{:?}", upright.notes);
+    let odd = read("0\\0\\0\\0\\0\\0", 7.0);
+    near(&odd.image.origin(), &[-10.0, 20.0]);
+    let note = ScanNote::OddAxes { axes: [[0.0; 3]; 2] };
+    assert!(odd.notes.contains(&note.into()), "{:?}", odd.notes);
+}
