@@ -76,6 +76,22 @@ fn refusal(error: ReadError) -> JobError {
             let parts: Vec<_> = parts.filter(|(_, n)| *n > 1).map(|(s, n)| part(s, n)).collect();
             JobError::misuse(&reason).advise(format!("{}, chooses one", parts.join(" and ")))
         }
+        ReadReason::Segments { .. } => {
+            JobError::misuse(&reason).advise("--segment NAME or its number chooses one")
+        }
+        ReadReason::Series(ref series)
+            if matches!(
+                **series,
+                SeriesError::SeveralSeries { .. } | SeriesError::NoSuchSeries { .. }
+            ) =>
+        {
+            JobError::misuse(&reason)
+                .advise("--series SERIES chooses one, by its UID, its number or its description")
+        }
+        ReadReason::Series(ref series) if matches!(**series, SeriesError::Gap { .. }) => {
+            JobError::content(&reason)
+                .advise("--spacing SX,SY,SZ takes the slices as evenly spaced, if none is missing")
+        }
         ReadReason::Series(ref series) if matches!(**series, SeriesError::Missing { .. }) => {
             JobError::content(&reason).advise(
                 "--spacing SX,SY,SZ gives the spacing, and puts slices without a position in the order of \

@@ -161,6 +161,38 @@ def test_read_says_what_it_took_for_granted(tmp_path: Path) -> None:
         am.read(tmp_path / "x.ppm", meaning="colour")
 
 
+def dicom(series: int, height: int) -> bytes:
+    """A slice of 2 × 1 samples, its elements alone."""
+    elements = [
+        (8, 0x60, b"CS", b"CT"),
+        (0x20, 0x0E, b"UI", b"1.%d\0" % series),
+        (0x20, 0x32, b"DS", b"0\\0\\%d " % height),
+        (0x20, 0x37, b"DS", b"1\\0\\0\\0\\1\\0 "),
+        (0x28, 0x10, b"US", b"\1\0"),
+        (0x28, 0x11, b"US", b"\2\0"),
+        (0x28, 0x30, b"DS", b"1\\1 "),
+        (0x28, 0x100, b"US", b"\x10\0"),
+    ]
+    data = b"".join(
+        group.to_bytes(2, "little") + element.to_bytes(2, "little") + kind + len(value).to_bytes(2, "little") + value
+        for group, element, kind, value in elements
+    )
+    return data + b"\xe0\x7f\x10\0OW\0\0\4\0\0\0" + bytes([series, 0, height, 0])
+
+
+def test_one_of_several_dicom_series_is_read(tmp_path: Path) -> None:
+    for series in (1, 2):
+        for height in (0, 3):
+            (tmp_path / f"s{series}-{height}").write_bytes(dicom(series, height))
+    with pytest.raises(am.InputError, match="several series"):
+        am.read(tmp_path)
+    with pytest.warns(am.AtomeshNote, match="preamble"):
+        img = am.read(tmp_path, series="1.2")
+    assert img.shape == (2, 1, 2) and img.spacing == (1.0, 1.0, 3.0)
+    np.testing.assert_array_equal(img.array.ravel(), [2, 0, 2, 3])
+    assert any("series 1.2" in note for note in img.notes)
+
+
 def test_options_are_generated_from_the_command() -> None:
     made = subprocess.run([sys.executable, TESTS.parent / "tools" / "make_options.py", "--check"], capture_output=True, text=True)
     assert made.returncode == 0, f"run tools/make_options.py again: {made.stderr}"

@@ -44,7 +44,7 @@ TYPES = {  # by the placeholder of the value
     **dict.fromkeys(("SX,SY[,SZ]", "X,Y[,Z]"), "Numbers"),
     **dict.fromkeys(("NX,NY[,NZ]", "INLINE,XLINE", "X,Y"), "Sequence[int]"),
     **dict.fromkeys(("DIR", "JSON", "HTML", "PICTURE", "NAME.json", "FILE"), "PathLike"),
-    **dict.fromkeys(("TYPE", "NAME", "NAME|N"), "str"),
+    **dict.fromkeys(("TYPE", "NAME", "SERIES", "NAME|N"), "str"),
 }
 ODD = {  # where the placeholder does not tell, or Python takes more than the command
     "size": "float | tuple[float, float] | ImageLike",

@@ -396,8 +396,8 @@ fn not_named(name: Option<&str>) -> String {
 }
 
 /// That segments overlap.
-fn overlap(count: usize) -> &'static str {
-    if count > 1 { ", which overlap" } else { "" }
+fn overlap(layers: usize) -> &'static str {
+    if layers > 1 { ", which overlap" } else { "" }
 }
 
 /// What was asked for, in the message of a stack.

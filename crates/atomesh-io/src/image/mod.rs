@@ -14,7 +14,7 @@
 //! | NPY, NPZ | npy, npz | every real type; arrays (y, x) or (z, y, x) | none |
 //! | NIfTI-1, NIfTI-2 | nii nii.gz hdr img | every real type, RGB; one volume | sform, else qform, else spacing |
 //! | MGH, MGZ | mgh mgz | bytes, integers, floats; one volume | RAS |
-//! | DICOM | a folder of slices, dcm | integers, rescaled to float32 | LPS turned to RAS |
+//! | DICOM | a folder of slices, dcm | integers, rescaled to float32; packed ones too; frames, segments | LPS turned to RAS |
 //! | MetaImage | mha, mhd | every real type; zlib | LPS turned to RAS where the file speaks of a body |
 //! | NRRD | nrrd, nhdr | every real type; gzip, bzip2, ascii, hex; segments | LPS, LAS turned to RAS; others as they are |
 //! | VTI | vti | every real type; zlib, LZ4, LZMA, base64, ascii | as it is |
@@ -92,6 +92,7 @@ mod pnm;
 mod raw;
 mod rsf;
 mod sample_type;
+mod scan_note;
 mod segy;
 mod series_error;
 mod shape;
@@ -120,6 +121,7 @@ pub use options::{
     Duplicates, GivenFrame, Meaning, RawLayout, ReadOptions, SegyOptions, StackOptions, Vertical,
 };
 pub use sample_type::{ByteOrder, SampleType, UnknownByteOrder, UnknownSampleType};
+pub use scan_note::ScanNote;
 pub use series_error::SeriesError;
 use table::extension;
 pub use traces::SampleFormat;

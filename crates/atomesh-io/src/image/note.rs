@@ -4,6 +4,7 @@ use std::fmt;
 use std::path::PathBuf;
 
 use super::any_image::AnyImage;
+use super::scan_note::ScanNote;
 use super::traces::SampleFormat;
 
 mod parts;
@@ -435,6 +436,8 @@ pub enum ReadNote {
         /// The count taken.
         count: usize,
     },
+    /// What became of the slices of a scan.
+    Scan(ScanNote),
 }
 
 /// Where a sample interval stands.
@@ -481,6 +484,9 @@ impl ReadNote {
 
     /// Whether the image may be other than the user thinks: a warning, not a remark.
     pub fn is_warning(&self) -> bool {
+        if let Self::Scan(note) = self {
+            return note.is_warning();
+        }
         !matches!(
             self,
             Self::Traces { .. }
@@ -501,6 +507,10 @@ impl ReadNote {
                 | Self::UsualResolution { .. }
                 | Self::Chosen { .. }
                 | Self::AtDetector { .. }
+                | Self::Sheared { .. }
+                | Self::LevelSlice { .. }
+                | Self::ObliqueSlice { .. }
+                | Self::Segment { .. }
         ) && self.parts_are_a_warning()
     }
 
@@ -511,6 +521,7 @@ impl ReadNote {
             Self::Vertical { is_known, .. } | Self::Axes { is_known, .. } => *is_known,
             Self::Slices { .. } | Self::Segment { .. } => true,
             Self::OneArray { is_chosen, .. } => *is_chosen,
+            Self::Scan(note) => note.is_remark(),
             _ => false,
         }
     }
@@ -644,6 +655,34 @@ impl fmt::Display for ReadNote {
                 f,
                 "slices have no position; they are in the order of their {numbers}, evenly spaced"
             ),
+            Self::Sheared { first, second, degrees, distance } => write!(
+                f,
+                "axes {} and {} meet at {degrees:.4} degrees in the file; the nearest ones at right angles \
+                 are taken, which moves samples by {distance:.4} at most",
+                ["x", "y", "z"][*first],
+                ["x", "y", "z"][*second]
+            ),
+            Self::LevelSlice { z } => {
+                write!(f, "a single slice is read as flat; it lies in the plane z = {z}")
+            }
+            Self::ObliqueSlice { origin, axes: [x, y] } => {
+                let listed = |numbers: &[f64; 3]| {
+                    let words: Vec<_> = numbers.iter().map(f64::to_string).collect();
+                    format!("({})", words.join(", "))
+                };
+                write!(
+                    f,
+                    "a single slice is read as flat, in its own plane: its first sample is at {} in the world, \
+                     its axes run along {} and {}",
+                    listed(origin),
+                    listed(x),
+                    listed(y)
+                )
+            }
+            Self::Segment { name, number, count } => {
+                write!(f, "segment {number} of {count}, {name:?}: 1 inside, 0 outside")
+            }
+            Self::Scan(note) => note.fmt(f),
             _ => self.write_stack(f),
         }
     }

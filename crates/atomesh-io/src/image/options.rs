@@ -25,9 +25,12 @@ pub struct ReadOptions {
     /// The array that is read, by its name, of files of several: NPZ, VTI and VTK. Default: the only one, or that
     /// which a VTI names as its scalars.
     pub array: Option<String>,
-    /// The segment of a segmentation (`.seg.nrrd`), by its name or its number from 1: samples are 1 inside and 0
+    /// The segment of a segmentation (`.seg.nrrd`, DICOM), by its name or its number from 1: samples are 1 inside and 0
     /// outside. Default: all of them as labels, which those that overlap cannot be.
     pub segment: Option<String>,
+    /// The series of a folder of DICOM files, by its identifier (UID), its number or its description. Default: the only
+    /// one.
+    pub series: Option<String>,
     /// The parts of the frame that the caller gives, which a file need not state. Default: none.
     pub given: GivenFrame,
 }

@@ -13,9 +13,17 @@ pub enum SeriesError {
         others: usize,
     },
     /// There are images of several series.
-    #[error("the folder holds several series: {series}; expected one: move the others elsewhere")]
+    #[error("there are several series: {series}; expected one")]
     SeveralSeries {
-        /// Their identifiers, counts and files, as a list.
+        /// Their identifiers, numbers, descriptions, counts and files, as a list.
+        series: String,
+    },
+    /// A series was asked for that is not there.
+    #[error("there is no series {wanted:?}; there are {series}")]
+    NoSuchSeries {
+        /// What was asked for.
+        wanted: String,
+        /// The series that there are, as a list.
         series: String,
     },
     /// A slice does not say where it is.

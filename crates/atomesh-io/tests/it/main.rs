@@ -4,6 +4,7 @@ mod brought;
 mod cell_exports;
 mod cell_files;
 mod cell_values;
+mod dicom;
 mod flow_files;
 mod foam_mesh;
 mod hostile;

@@ -529,7 +529,7 @@ fn slices_that_are_not_one_volume_are_named() {
 
     let (error, _) = series_error(|k, slice| {
         if k == 2 {
-            slice.position[1] += 0.3;
+            slice.position[1] += 0.6;
         }
     });
     assert!(matches!(error, SeriesError::Gap { .. }), "{error:?}");
@@ -547,7 +547,8 @@ fn slices_that_are_not_one_volume_are_named() {
     });
     assert!(text.contains("b.17 has the orientation"), "{text}");
 
-    let leaning = series(|k, slice| slice.position[2] += k as f64);
+    // steeper than a tilted gantry
+    let leaning = series(|k, slice| slice.position[2] += 4.0 * k as f64);
     let error = read(leaning.path()).unwrap_err();
     assert!(matches!(error.reason, ReadReason::Sheared { first: 1, second: 2, .. }), "{error}");
 }
@@ -555,10 +556,10 @@ fn slices_that_are_not_one_volume_are_named() {
 #[test]
 fn slices_that_cannot_be_read_are_named() {
     for (change, part) in [
-        ((|s| s.frames = "12") as fn(&mut Slice), "12 frames"),
+        ((|s| s.frames = "12") as fn(&mut Slice), "20 of 240 samples"),
         (|s| s.photometric = "RGB", "RGB samples"),
-        (|s| s.syntax = "1.2.840.10008.1.2.4.70", "lossless JPEG"),
-        (|s| s.syntax = "1.2.840.10008.1.2.1.99", "deflated"),
+        (|s| s.syntax = "1.2.840.10008.1.2.4.70", "packed otherwise"),
+        (|s| s.syntax = "1.2.840.10008.1.2.1.99", "deflate"),
         (|s| s.samples.truncate(20), "10 of 20 samples"),
         (|s| s.position[0] = f64::NAN, "image position (patient) is NaN"),
     ] {

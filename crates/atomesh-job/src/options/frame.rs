@@ -68,7 +68,11 @@ section! {
         /// VTI and VTK the file's scalars, or the first
         #[arg(long, value_name = "NAME")]
         pub array: String,
-        /// Segmentations (.seg.nrrd): which segment, by its name or its number from 1; samples are 1 in it and 0
+        /// DICOM folders of several series: which one, by its UID, its number or its description. Default: several are an
+        /// error
+        #[arg(long, value_name = "SERIES")]
+        pub series: String,
+        /// Segmentations (.seg.nrrd, DICOM): which segment, by its name or its number from 1; samples are 1 in it and 0
         /// elsewhere. Default: all as labels; segments that overlap are an error
         #[arg(long, value_name = "NAME|N")]
         pub segment: String,
@@ -199,6 +203,7 @@ impl FrameOptions {
         let (raw, memory_limit) = (self.raw_layout()?, memory::room());
         let (array, segment) = (self.array.clone(), self.segment.clone());
         let meaning = Meaning::default();
+        let series = self.series.clone();
         Ok(ReadOptions {
             raw,
             segy,
@@ -206,6 +211,7 @@ impl FrameOptions {
             memory_limit,
             stack,
             array,
+            series,
             segment,
             given,
             meaning,

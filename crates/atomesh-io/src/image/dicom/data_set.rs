@@ -1,80 +1,46 @@
 //! The elements of a DICOM file that an image needs, and where its pixel data are.
-//!
-//! Definition: PS3.5 (data structures and encoding) and PS3.10 (file format). Explicit and implicit
-//! value representations are read, in either byte order. All other elements are skipped without being held,
-//! sequences with their nested items too.
 
-use std::io::{BufReader, ErrorKind, Read, Seek, SeekFrom};
+use std::io::{Read, Seek};
 
 use super::super::affine::wrong;
 use super::super::error::ReadReason;
 use super::super::sample_type::ByteOrder;
 use super::FORMAT;
+use super::reader::{Head, Reader, UNDEFINED};
+use super::tag;
 
-/// The longest value that is held; the wanted ones are short.
+/// The longest value that is held; the wanted ones are short, but for these.
 const LONGEST_VALUE: u32 = 1 << 12;
+
+/// The same of look-up tables and offsets of frames.
+const LONGEST_LIST: u32 = 1 << 18;
+
+/// The most bytes of values, and items of sequences, that are held of a file.
+const MOST_BYTES: u64 = 1 << 26;
+const MOST_ITEMS: usize = 1 << 20;
 
 /// How deep sequences may be nested.
 const DEEPEST: usize = 32;
 
-/// The length that stands for "until a delimiter comes".
-const UNDEFINED: u32 = u32::MAX;
-
-/// Tags as group and element in one number.
-pub(super) mod tag {
-    pub const TRANSFER_SYNTAX: u32 = 0x0002_0010;
-    pub const SERIES: u32 = 0x0020_000e;
-    pub const IMAGER_SPACING: u32 = 0x0018_1164;
-    pub const INSTANCE: u32 = 0x0020_0013;
-    pub const POSITION: u32 = 0x0020_0032;
-    pub const ORIENTATION: u32 = 0x0020_0037;
-    pub const SAMPLES_PER_PIXEL: u32 = 0x0028_0002;
-    pub const PHOTOMETRIC: u32 = 0x0028_0004;
-    pub const FRAME_COUNT: u32 = 0x0028_0008;
-    pub const ROWS: u32 = 0x0028_0010;
-    pub const COLUMNS: u32 = 0x0028_0011;
-    pub const PIXEL_SPACING: u32 = 0x0028_0030;
-    pub const BITS_ALLOCATED: u32 = 0x0028_0100;
-    pub const BITS_STORED: u32 = 0x0028_0101;
-    pub const HIGH_BIT: u32 = 0x0028_0102;
-    pub const IS_SIGNED: u32 = 0x0028_0103;
-    pub const INTERCEPT: u32 = 0x0028_1052;
-    pub const SLOPE: u32 = 0x0028_1053;
-    pub const MODALITY_TABLE: u32 = 0x0028_3000;
-    pub const PIXELS: u32 = 0x7fe0_0010;
-    pub const ITEM: u32 = 0xfffe_e000;
-    pub const ITEM_END: u32 = 0xfffe_e00d;
-    pub const SEQUENCE_END: u32 = 0xfffe_e0dd;
-
-    /// The elements that are kept.
-    pub const WANTED: [u32; 19] = [
-        TRANSFER_SYNTAX,
-        IMAGER_SPACING,
-        SERIES,
-        INSTANCE,
-        POSITION,
-        ORIENTATION,
-        SAMPLES_PER_PIXEL,
-        PHOTOMETRIC,
-        FRAME_COUNT,
-        ROWS,
-        COLUMNS,
-        PIXEL_SPACING,
-        BITS_ALLOCATED,
-        BITS_STORED,
-        HIGH_BIT,
-        IS_SIGNED,
-        INTERCEPT,
-        SLOPE,
-        MODALITY_TABLE,
-    ];
+/// The kept elements of a file, or of an item.
+#[derive(Debug, Default)]
+pub(super) struct DataSet {
+    elements: Vec<(u32, Value)>,
+    byte_order: ByteOrder,
 }
 
-/// The kept elements of a file.
-pub(super) struct DataSet {
-    elements: Vec<(u32, Vec<u8>)>,
-    pub byte_order: ByteOrder,
+#[derive(Debug)]
+enum Value {
+    Bytes(Vec<u8>),
+    Items(Vec<DataSet>),
+}
+
+/// What a file holds.
+pub(super) struct Content {
+    pub set: DataSet,
     pub pixels: Option<PixelData>,
+    /// The byte order of the pixel data.
+    pub byte_order: ByteOrder,
 }
 
 /// Where pixel data are in a file.
@@ -89,8 +55,24 @@ pub(super) struct PixelData {
 impl DataSet {
     /// The value of an element, if it is there and not empty.
     pub fn get(&self, tag: u32) -> Option<&[u8]> {
-        let found = self.elements.iter().find(|(t, _)| *t == tag);
-        found.map(|(_, value)| value.as_slice()).filter(|value| !value.is_empty())
+        self.elements.iter().find_map(|(found, value)| match value {
+            Value::Bytes(bytes) if *found == tag && !bytes.is_empty() => Some(bytes.as_slice()),
+            _ => None,
+        })
+    }
+
+    /// Whether an element is there, empty or not.
+    pub fn has(&self, tag: u32) -> bool {
+        self.elements.iter().any(|(found, _)| *found == tag)
+    }
+
+    /// The items of a sequence; none if it is not there.
+    pub fn items(&self, tag: u32) -> &[Self] {
+        let found = self.elements.iter().find_map(|(found, value)| match value {
+            Value::Items(items) if *found == tag => Some(items.as_slice()),
+            _ => None,
+        });
+        found.unwrap_or_default()
     }
 
     /// The value of a text.
@@ -99,276 +81,218 @@ impl DataSet {
         Some(text.trim_matches(|c: char| c.is_whitespace() || c == '\0').to_owned())
     }
 
+    /// The decimal numbers of a text, however many they are.
+    pub fn list(&self, tag: u32, name: &'static str) -> Result<Option<Vec<f64>>, ReadReason> {
+        let Some(text) = self.text(tag) else { return Ok(None) };
+        let numbers: Option<Vec<f64>> = text.split('\\').map(|w| w.trim().parse().ok()).collect();
+        let numbers = numbers.filter(|all| all.iter().all(|x| x.is_finite()));
+        let found = || text.chars().take(80).collect::<String>();
+        numbers.map(Some).ok_or_else(|| wrong(FORMAT, name, found(), "finite numbers"))
+    }
+
     /// The decimal numbers of a text.
     pub fn decimals<const N: usize>(
         &self,
         tag: u32,
         name: &'static str,
     ) -> Result<Option<[f64; N]>, ReadReason> {
-        let Some(text) = self.text(tag) else { return Ok(None) };
-        let numbers: Option<Vec<f64>> = text.split('\\').map(|w| w.trim().parse().ok()).collect();
-        let numbers = numbers.filter(|all| all.iter().all(|x| x.is_finite()));
-        let array = numbers.and_then(|all| all.try_into().ok());
         let expected = match N {
             1 => "a number",
             2 => "two numbers",
             3 => "three numbers",
             _ => "six numbers",
         };
+        let Some(text) = self.text(tag).filter(|text| !text.is_empty()) else { return Ok(None) };
+        let numbers = self.list(tag, name).ok().flatten();
+        let array = numbers.and_then(|all| all.try_into().ok());
         array.map(Some).ok_or_else(|| wrong(FORMAT, name, text, expected))
     }
 
     /// The value of an unsigned 16-bit integer.
     pub fn short(&self, tag: u32) -> Option<u16> {
-        let bytes = self.get(tag)?.first_chunk::<2>()?;
-        Some(match self.byte_order {
+        self.shorts(tag)?.next()
+    }
+
+    /// The values of unsigned 16-bit integers.
+    pub fn shorts(&self, tag: u32) -> Option<impl Iterator<Item = u16>> {
+        let words = self.get(tag)?.as_chunks::<2>().0;
+        Some(words.iter().map(|bytes| match self.byte_order {
             ByteOrder::Little => u16::from_le_bytes(*bytes),
             ByteOrder::Big => u16::from_be_bytes(*bytes),
-        })
+        }))
     }
 }
 
-/// Whether a file begins as DICOM files do, with 128 bytes of anything and a magic word.
-pub(super) fn is_dicom(source: &mut dyn Read) -> bool {
-    let mut head = [0; 132];
-    source.read_exact(&mut head).is_ok() && head.ends_with(b"DICM")
+/// What may still be held of a file.
+struct Room {
+    bytes: u64,
+    items: usize,
 }
 
-/// Takes the elements of a file one by one.
-pub(super) struct Reader<R> {
-    source: BufReader<R>,
-    at: u64,
-    pub file_bytes: u64,
-    byte_order: ByteOrder,
-    is_explicit: bool,
-}
-
-/// What stands before the value of an element.
-struct Head {
-    tag: u32,
-    /// The value representation, two blanks where it is implicit.
-    kind: [u8; 2],
-    length: u32,
-}
-
-impl<R: Read + Seek> Reader<R> {
-    /// A file from its beginning.
-    pub fn new(source: R, file_bytes: u64) -> Self {
-        let source = BufReader::with_capacity(1 << 13, source);
-        Self { source, at: 0, file_bytes, byte_order: ByteOrder::Little, is_explicit: true }
-    }
-
-    /// Reads up to the pixel data, or the end of a file that has none.
-    pub fn read(&mut self) -> Result<DataSet, ReadReason> {
-        let start = self.take::<132>()?;
-        if !start.ends_with(b"DICM") {
-            return Err(ReadReason::Magic { format: FORMAT, found: start[..8].into(), like: None });
-        }
-        let mut set = DataSet { elements: Vec::new(), byte_order: ByteOrder::Little, pixels: None };
-        let mut is_meta = true;
-        while self.at < self.file_bytes {
-            if is_meta && !self.peeks_meta()? {
-                is_meta = false;
-                self.use_syntax(set.text(tag::TRANSFER_SYNTAX).as_deref().unwrap_or_default())?;
-                set.byte_order = self.byte_order;
-            }
-            let head = self.head()?;
-            if head.tag == tag::PIXELS {
-                let length = Some(head.length).filter(|&length| length != UNDEFINED);
-                set.pixels = Some(PixelData { start: self.at, length });
-                break;
-            }
-            if head.length != UNDEFINED && tag::WANTED.contains(&head.tag) && &head.kind != b"SQ" {
-                let value = self.value(head.length)?;
-                set.elements.push((head.tag, value));
-                continue;
-            }
-            if head.tag == tag::MODALITY_TABLE {
-                set.elements.push((head.tag, vec![1]));
-            }
-            self.skip_value(&head, 0)?;
-        }
-        Ok(set)
-    }
-
-    /// Whether the next element is of group 2, which is always explicit, least byte first.
-    fn peeks_meta(&mut self) -> Result<bool, ReadReason> {
-        let mut group = [0; 2];
-        self.source.read_exact(&mut group).map_err(Self::cut)?;
-        self.source.seek_relative(-2).map_err(ReadReason::Io)?;
-        Ok(group == [2, 0])
-    }
-
-    /// Goes on in the encoding of a transfer syntax. How pixel data are packed is looked at later.
-    fn use_syntax(&mut self, syntax: &str) -> Result<(), ReadReason> {
-        match syntax {
-            "1.2.840.10008.1.2" => self.is_explicit = false,
-            "1.2.840.10008.1.2.2" => self.byte_order = ByteOrder::Big,
-            "1.2.840.10008.1.2.1.99" => {
-                return Err(ReadReason::Unsupported {
-                    format: FORMAT,
-                    found: "a deflated data set".into(),
-                    expected: "a plain one: unpack it first, as by dcmconv +te",
-                });
-            }
-            _ => {} // all others are explicit, least byte first
-        }
-        Ok(())
-    }
-
-    fn cut(error: std::io::Error) -> ReadReason {
-        match error.kind() {
-            ErrorKind::UnexpectedEof => wrong(FORMAT, "file", "cut short", "whole elements"),
-            _ => ReadReason::Io(error),
-        }
-    }
-
-    fn take<const N: usize>(&mut self) -> Result<[u8; N], ReadReason> {
-        let mut bytes = [0; N];
-        self.source.read_exact(&mut bytes).map_err(Self::cut)?;
-        self.at += N as u64;
-        Ok(bytes)
-    }
-
-    fn u16(&mut self) -> Result<u16, ReadReason> {
-        let bytes = self.take()?;
-        Ok(match self.byte_order {
-            ByteOrder::Little => u16::from_le_bytes(bytes),
-            ByteOrder::Big => u16::from_be_bytes(bytes),
-        })
-    }
-
-    fn u32(&mut self) -> Result<u32, ReadReason> {
-        let bytes = self.take()?;
-        Ok(match self.byte_order {
-            ByteOrder::Little => u32::from_le_bytes(bytes),
-            ByteOrder::Big => u32::from_be_bytes(bytes),
-        })
-    }
-
-    fn tag(&mut self) -> Result<u32, ReadReason> {
-        Ok(u32::from(self.u16()?) << 16 | u32::from(self.u16()?))
-    }
-
-    fn head(&mut self) -> Result<Head, ReadReason> {
-        let tag = self.tag()?;
-        // items and delimiters have no representation
-        if !self.is_explicit || tag >> 16 == 0xfffe {
-            return Ok(Head { tag, kind: *b"  ", length: self.u32()? });
-        }
-        let kind = self.take::<2>()?;
-        let length = match &kind {
-            b"OB" | b"OD" | b"OF" | b"OL" | b"OV" | b"OW" | b"SQ" | b"SV" | b"UC" | b"UN"
-            | b"UR" | b"UT" | b"UV" => {
-                self.u16()?; // reserved
-                self.u32()?
-            }
-            [b'A'..=b'Z', b'A'..=b'Z'] => self.u16()?.into(),
-            _ => {
-                let value = format!("\"{}\"", kind.escape_ascii());
-                return Err(wrong(FORMAT, "value representation", value, "two letters"));
-            }
+impl Room {
+    fn value(&mut self, head: &Head) -> Result<(), ReadReason> {
+        let longest = match head.tag {
+            tag::TABLE_DATA | tag::FRAME_OFFSETS | tag::EXTENDED_OFFSETS => LONGEST_LIST,
+            _ => LONGEST_VALUE,
         };
-        Ok(Head { tag, kind, length })
-    }
-
-    /// The value of an element that is kept.
-    fn value(&mut self, length: u32) -> Result<Vec<u8>, ReadReason> {
-        if length > LONGEST_VALUE {
-            let found = format!("{length} bytes");
-            return Err(wrong(FORMAT, "length of an element", found, "at most 4096 here"));
+        if head.length > longest {
+            let found = format!("{} bytes", head.length);
+            let expected =
+                if longest == LONGEST_LIST { "at most 262144 here" } else { "at most 4096 here" };
+            return Err(wrong(FORMAT, "length of an element", found, expected));
         }
-        let mut value = vec![0; length as usize];
-        self.source.read_exact(&mut value).map_err(Self::cut)?;
-        self.at += u64::from(length);
-        Ok(value)
-    }
-
-    fn skip(&mut self, length: u32) -> Result<(), ReadReason> {
-        if self.file_bytes.saturating_sub(self.at) < length.into() {
-            return Err(Self::cut(ErrorKind::UnexpectedEof.into()));
-        }
-        self.source.seek_relative(length.into()).map_err(ReadReason::Io)?;
-        self.at += u64::from(length);
+        let left = self.bytes.checked_sub(head.length.into());
+        let too_many = || wrong(FORMAT, "elements", "more than 64 MiB", "those of an image");
+        self.bytes = left.ok_or_else(too_many)?;
         Ok(())
     }
 
-    /// Skips a value; one without a length is a sequence of items.
-    fn skip_value(&mut self, head: &Head, depth: usize) -> Result<(), ReadReason> {
-        if head.length != UNDEFINED {
-            return self.skip(head.length);
-        }
-        if depth == DEEPEST {
-            return Err(wrong(FORMAT, "sequences", "nested deeper", "at most 32 levels"));
-        }
-        // what is unknown to the writer stays implicit inside
-        let is_explicit = self.is_explicit;
-        self.is_explicit &= &head.kind != b"UN";
-        loop {
-            let tag = self.tag()?;
-            let length = self.u32()?;
-            match tag {
-                tag::SEQUENCE_END => break,
-                tag::ITEM if length != UNDEFINED => self.skip(length)?,
-                tag::ITEM => self.skip_item(depth)?,
-                _ => {
-                    let value = format!("({:04x},{:04x})", tag >> 16, tag & 0xffff);
-                    return Err(wrong(FORMAT, "sequence", value, "items and an end"));
-                }
-            }
-        }
-        self.is_explicit = is_explicit;
+    fn item(&mut self) -> Result<(), ReadReason> {
+        let too_many = || wrong(FORMAT, "sequences", "more than 1048576 items", "those of frames");
+        self.items = self.items.checked_sub(1).ok_or_else(too_many)?;
         Ok(())
     }
+}
 
-    /// Skips the elements of an item up to its end.
-    fn skip_item(&mut self, depth: usize) -> Result<(), ReadReason> {
-        loop {
-            let head = self.head()?;
-            if head.tag == tag::ITEM_END {
-                return Ok(());
+/// Reads a file up to its pixel data, or to its end if it has none.
+pub(super) fn read<R: Read + Seek>(reader: &mut Reader<R>) -> Result<Content, ReadReason> {
+    reader.start()?;
+    let mut room = Room { bytes: MOST_BYTES, items: MOST_ITEMS };
+    let mut set = DataSet::default();
+    let mut pixels = None;
+    let mut is_meta = true;
+    while !reader.is_at_end()? {
+        if is_meta && !reader.peeks_meta()? {
+            is_meta = false;
+            reader.use_syntax(set.text(tag::TRANSFER_SYNTAX).as_deref())?;
+            set.byte_order = reader.byte_order;
+            continue;
+        }
+        let head = reader.head()?;
+        if head.tag == tag::PIXELS {
+            let length = Some(head.length).filter(|&length| length != UNDEFINED);
+            pixels = Some(PixelData { start: reader.at, length });
+            break;
+        }
+        take(reader, &mut set, &head, &mut room, 0)?;
+    }
+    Ok(Content { set, pixels, byte_order: reader.byte_order })
+}
+
+/// Keeps an element if it is wanted, and goes past it.
+fn take<R: Read + Seek>(
+    reader: &mut Reader<R>,
+    set: &mut DataSet,
+    head: &Head,
+    room: &mut Room,
+    depth: usize,
+) -> Result<(), ReadReason> {
+    let is_sequence = tag::SEQUENCES.contains(&head.tag);
+    if is_sequence && (head.length > 0) {
+        let mut items = Vec::new();
+        each_item(reader, head, depth, &mut |reader, end| {
+            room.item()?;
+            let byte_order = reader.byte_order;
+            let mut item = DataSet { elements: Vec::new(), byte_order };
+            each_element(reader, end, &mut |reader, head| {
+                take(reader, &mut item, head, room, depth + 1)
+            })?;
+            items.push(item);
+            Ok(())
+        })?;
+        set.elements.push((head.tag, Value::Items(items)));
+        return Ok(());
+    }
+    let is_float = [tag::FLOAT_PIXELS, tag::DOUBLE_PIXELS].contains(&head.tag);
+    if is_float {
+        set.elements.push((head.tag, Value::Bytes(vec![1])));
+    } else if head.length != UNDEFINED && tag::WANTED.contains(&head.tag) && &head.kind != b"SQ" {
+        room.value(head)?;
+        let value = reader.value(head.length)?;
+        set.elements.push((head.tag, Value::Bytes(value)));
+        return Ok(());
+    }
+    skip(reader, head, depth)
+}
+
+/// Goes past an element; one without a length is a sequence of items.
+fn skip<R: Read + Seek>(
+    reader: &mut Reader<R>,
+    head: &Head,
+    depth: usize,
+) -> Result<(), ReadReason> {
+    if head.length != UNDEFINED {
+        return reader.skip(head.length);
+    }
+    each_item(reader, head, depth, &mut |reader, end| match end {
+        Some(end) => reader.skip((end - reader.at) as u32),
+        None => each_element(reader, None, &mut |reader, head| skip(reader, head, depth + 1)),
+    })
+}
+
+/// What is done with an item whose end is known, or marked.
+type ForItem<'a, R> = &'a mut dyn FnMut(&mut Reader<R>, Option<u64>) -> Result<(), ReadReason>;
+
+/// What is done with an element whose head was read; it goes past the value.
+type ForElement<'a, R> = &'a mut dyn FnMut(&mut Reader<R>, &Head) -> Result<(), ReadReason>;
+
+/// Goes through the items of a sequence.
+fn each_item<R: Read + Seek>(
+    reader: &mut Reader<R>,
+    head: &Head,
+    depth: usize,
+    for_item: ForItem<'_, R>,
+) -> Result<(), ReadReason> {
+    if depth == DEEPEST {
+        return Err(wrong(FORMAT, "sequences", "nested deeper", "at most 32 levels"));
+    }
+    // what is unknown to the writer stays implicit inside, least byte first
+    let before = (reader.is_explicit, reader.byte_order);
+    if &head.kind == b"UN" {
+        (reader.is_explicit, reader.byte_order) = (false, ByteOrder::Little);
+    }
+    let end =
+        Some(head.length).filter(|&n| n != UNDEFINED).map(|length| reader.at + u64::from(length));
+    while end.is_none_or(|end| reader.at < end) {
+        let (tag, length) = (reader.tag()?, reader.u32()?);
+        match tag {
+            tag::SEQUENCE_END => break,
+            tag::ITEM => {
+                let stop =
+                    Some(length).filter(|&n| n != UNDEFINED).map(|n| reader.at + u64::from(n));
+                for_item(reader, stop)?;
             }
-            self.skip_value(&head, depth + 1)?;
+            _ => {
+                let value = format!("({:04x},{:04x})", tag >> 16, tag & 0xffff);
+                return Err(wrong(FORMAT, "sequence", value, "items and an end"));
+            }
         }
     }
+    inside(reader, end)?;
+    (reader.is_explicit, reader.byte_order) = before;
+    Ok(())
+}
 
-    /// `length` bytes of pixel data from a place of the file.
-    pub fn pixel_bytes(&mut self, start: u64, length: u64) -> Result<Vec<u8>, ReadReason> {
-        if self.file_bytes.saturating_sub(start) < length {
-            return Err(Self::cut(ErrorKind::UnexpectedEof.into()));
+/// Goes through the elements of an item.
+fn each_element<R: Read + Seek>(
+    reader: &mut Reader<R>,
+    end: Option<u64>,
+    for_element: ForElement<'_, R>,
+) -> Result<(), ReadReason> {
+    while end.is_none_or(|end| reader.at < end) {
+        let head = reader.head()?;
+        if head.tag == tag::ITEM_END {
+            break;
         }
-        let mut bytes = Vec::new();
-        let room = usize::try_from(length).unwrap_or(usize::MAX);
-        let memory = |_| ReadReason::Memory { bytes: length.into(), limit: None };
-        bytes.try_reserve_exact(room).map_err(memory)?;
-        self.source.seek(SeekFrom::Start(start)).map_err(ReadReason::Io)?;
-        (&mut self.source).take(length).read_to_end(&mut bytes).map_err(ReadReason::Io)?;
-        self.at = start + length;
-        Ok(bytes)
+        for_element(reader, &head)?;
     }
+    inside(reader, end)
+}
 
-    /// The packed fragments of pixel data from a place of the file, one after another, without the
-    /// table of offsets that comes first.
-    pub fn fragments(&mut self, start: u64) -> Result<Vec<u8>, ReadReason> {
-        self.source.seek(SeekFrom::Start(start)).map_err(ReadReason::Io)?;
-        self.at = start;
-        self.byte_order = ByteOrder::Little;
-        let mut bytes = Vec::new();
-        let mut is_table = true;
-        loop {
-            let tag = self.tag()?;
-            let length = self.u32()?;
-            match tag {
-                tag::SEQUENCE_END => return Ok(bytes),
-                tag::ITEM if std::mem::take(&mut is_table) => self.skip(length)?,
-                tag::ITEM => {
-                    let at = self.at;
-                    bytes.extend(self.pixel_bytes(at, length.into())?);
-                }
-                _ => {
-                    return Err(wrong(FORMAT, "pixel data", "no fragment", "fragments and an end"));
-                }
-            }
-        }
+/// Checks that what is inside did not go on after the end.
+fn inside<R>(reader: &Reader<R>, end: Option<u64>) -> Result<(), ReadReason> {
+    match end.filter(|&end| reader.at > end) {
+        Some(_) => Err(wrong(FORMAT, "sequence", "longer than it says", "items within its length")),
+        None => Ok(()),
     }
 }

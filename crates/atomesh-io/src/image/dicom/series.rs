@@ -3,126 +3,200 @@
 //! Order and spacing come from the slices' positions, projected on the normal of their plane; what a
 //! header says of slice thickness or numbers is no place and is not looked at.
 
-use std::collections::BTreeMap;
-
 use atomesh::geometry::dot;
 
+use super::super::note::ReadNote;
 use super::super::options::GivenFrame;
+use super::super::scan_note::ScanNote;
 use super::super::series_error::SeriesError;
-use super::slice::Slice;
+use super::header::{Header, Plane};
+use super::segments::rungs;
 
 /// How far apart two orientations or spacings of one series may be, relative to 1: they are rounded
-/// to five digits or so.
-const SAME: f64 = 1e-4;
+/// to three digits at worst.
+const SAME: f64 = 1e-3;
 
-/// How far a slice may be from its place, in gaps: positions are rounded to tenths of a millimetre at
-/// worst, gaps are several of these.
+/// How far axes may be from unit vectors at right angles: those of three digits are a thousandth off.
+const SQUARE: f64 = 5e-3;
+
+/// How far a slice may be from its even place, in gaps, before it is resampled: positions are rounded to tenths of a
+/// millimetre at worst, gaps are several of these.
 const EVEN: f64 = 0.02;
+
+/// The same before the series is refused.
+const UNEVEN: f64 = 0.05;
 
 /// Slices that are nearer than this are at one place, in world units.
 const LEAST_GAP: f64 = 1e-4;
 
-/// The most names in a message.
-const NAMED: usize = 4;
+/// One slice of a volume.
+#[derive(Clone, Debug)]
+pub(super) struct Slice {
+    /// The file, and its frame if it has several, for messages.
+    pub name: String,
+    /// The number of the file among those read, and of the frame in it.
+    pub source: (usize, usize),
+    pub plane: Plane,
+}
 
-/// The slices of one series in the order of their places, and the step from one to the next in the
-/// world of the files.
+/// The slices of files, each a header with the file's name.
+pub(super) fn slices(files: &[(String, Header)]) -> Vec<Slice> {
+    let of_file = |(file, (name, header)): (usize, &(String, Header))| {
+        let frames = header.planes.len();
+        let named = |(frame, plane): (usize, &Plane)| Slice {
+            name: if frames == 1 { name.clone() } else { frame_name(name, frame) },
+            source: (file, frame),
+            plane: plane.clone(),
+        };
+        header.planes.iter().enumerate().map(named).collect::<Vec<_>>()
+    };
+    files.iter().enumerate().flat_map(of_file).collect()
+}
+
+fn frame_name(file: &str, frame: usize) -> String {
+    match file {
+        "" => format!("frame {}", frame + 1),
+        _ => format!("{file}, frame {},", frame + 1),
+    }
+}
+
+/// The slices of one series in the order of their places.
 #[derive(Debug)]
 pub(super) struct Series {
-    /// Each with the name of its file.
-    pub slices: Vec<(String, Slice)>,
+    pub slices: Vec<Slice>,
+    /// The world directions of x and y, orthonormal as nearly as the files say; none if they say nothing.
+    pub axes: Option<[[f64; 3]; 2]>,
+    /// The place of each slice along the normal.
+    pub heights: Vec<f64>,
+    /// The step from one slice to the next in the world of the files.
     pub step: [f64; 3],
-    /// Whether they have no places, and are in the order of their numbers.
-    pub is_by_number: bool,
+    /// Whether slices are to be moved to even places.
+    pub is_uneven: bool,
+    /// Which slices of the volume these are, and how many it has, if some are missing.
+    pub rungs: Option<(Vec<usize>, usize)>,
+    pub notes: Vec<ReadNote>,
 }
 
 impl Series {
-    /// Puts slices in order. A single one needs no place, and none needs what the caller gives.
+    /// Puts slices in order. A single one needs no place, and none needs what the caller gives. Slices may be missing
+    /// where `has_gaps`.
     pub fn new(
-        mut slices: Vec<(String, Slice)>,
-        others: usize,
+        mut slices: Vec<Slice>,
         given: GivenFrame,
+        has_gaps: bool,
     ) -> Result<Self, SeriesError> {
-        slices.sort_by(|a, b| a.0.cmp(&b.0));
-        let Some((first, head)) = slices.first().cloned() else {
-            return Err(SeriesError::NoImages { others });
-        };
-        one_series(&slices)?;
-        for (file, slice) in &slices {
-            same(&first, &head, file, slice)?;
+        slices.sort_by(|a, b| a.name.cmp(&b.name).then(a.source.cmp(&b.source)));
+        let head = slices[0].clone();
+        for slice in &slices {
+            same(&head, slice, given)?;
         }
+        let axes = head.plane.axes.and_then(unit_axes);
         if slices.len() == 1 {
-            return Ok(Self { slices, step: [0.0; 3], is_by_number: false });
+            return Ok(Self::ordered(slices, axes, vec![0.0], [0.0; 3]));
         }
-        let lacks = |lacks: fn(&Slice) -> bool| slices.iter().find(|(_, slice)| lacks(slice));
-        let missing = |(file, _): &(String, Slice), entry| {
-            Err(SeriesError::Missing { file: file.clone(), entry })
-        };
+        if let Some(bad) = head.plane.axes.filter(|_| axes.is_none() && !given.direction) {
+            return Err(SeriesError::Axes { file: head.name, axes: bad });
+        }
+        let lacks = |lacks: fn(&Plane) -> bool| slices.iter().find(|slice| lacks(&slice.plane));
+        let missing =
+            |slice: &Slice, entry| Err(SeriesError::Missing { file: slice.name.clone(), entry });
         if let Some(odd) = lacks(|s| s.spacing.is_none()).filter(|_| !given.spacing) {
             return missing(odd, "pixel spacing");
         }
-        let has_axes = head.axes.is_some();
         match lacks(|s| s.position.is_none()) {
-            Some(_) if given.spacing && lacks(|s| s.instance.is_none()).is_none() => {
-                return Self::by_number(slices);
-            }
-            Some(odd) => return missing(odd, "image position"),
-            None if !(has_axes || given.spacing && given.direction) => {
-                return missing(&slices[0], "image orientation");
-            }
-            None => {}
+            Some(_) if given.spacing => Self::by_number(slices, axes),
+            Some(odd) => missing(odd, "image position"),
+            None if axes.is_none() && !given.direction => missing(&head, "image orientation"),
+            None => Self::by_place(slices, axes, given, has_gaps),
         }
-        let normal = match head.axes {
-            Some(axes) => normal(axes).ok_or(SeriesError::Axes { file: first, axes })?,
-            None => widest(&slices),
-        };
-        Self::by_place(slices, normal, has_axes)
+    }
+
+    fn ordered(
+        slices: Vec<Slice>,
+        axes: Option<[[f64; 3]; 2]>,
+        heights: Vec<f64>,
+        step: [f64; 3],
+    ) -> Self {
+        let (is_uneven, rungs, notes) = (false, None, Vec::new());
+        Self { slices, axes, heights, step, is_uneven, rungs, notes }
     }
 
     /// Slices in the order of their places along a normal; a step along z if their axes are not known.
     fn by_place(
-        slices: Vec<(String, Slice)>,
-        normal: [f64; 3],
-        has_axes: bool,
+        slices: Vec<Slice>,
+        axes: Option<[[f64; 3]; 2]>,
+        given: GivenFrame,
+        has_gaps: bool,
     ) -> Result<Self, SeriesError> {
-        let place = |slice: &Slice| slice.position.map_or(0.0, |p| dot(&p, &normal));
-        let mut placed: Vec<_> = slices.into_iter().map(|(f, s)| (place(&s), f, s)).collect();
-        placed.sort_by(|a, b| a.0.total_cmp(&b.0).then_with(|| a.1.cmp(&b.1)));
-        let places: Vec<_> =
-            placed.iter().map(|(place, file, _)| (*place, file.as_str())).collect();
-        even(&places)?;
-        let at = |k: usize| placed[k].2.position.unwrap_or_default();
-        let (from, to) = (at(0), at(placed.len() - 1));
-        let gaps = (placed.len() - 1) as f64;
+        let normal = axes.map_or_else(|| widest(&slices), normal);
+        let place = |slice: &Slice| slice.plane.position.map_or(0.0, |p| dot(&p, &normal));
+        let mut placed: Vec<_> = slices.into_iter().map(|s| (place(&s), s)).collect();
+        placed.sort_by(|a, b| a.0.total_cmp(&b.0).then_with(|| a.1.name.cmp(&b.1.name)));
+        let heights: Vec<f64> = placed.iter().map(|(place, _)| *place).collect();
+        let slices: Vec<Slice> = placed.into_iter().map(|(_, slice)| slice).collect();
+        let rungs = if has_gaps { rungs(&heights) } else { None };
+        let found = match rungs {
+            Some(_) => Evenness::Even,
+            None => even(&heights, &slices, given.spacing)?,
+        };
+        let at = |k: usize| slices[k].plane.position.unwrap_or_default();
+        let (from, to) = (at(0), at(slices.len() - 1));
+        let count = rungs.as_ref().map_or(slices.len(), |(_, count)| *count);
+        let gaps = (count - 1) as f64;
         let mut step = std::array::from_fn(|r| (to[r] - from[r]) / gaps);
-        if !has_axes {
+        if axes.is_none() {
             step = [0.0, 0.0, dot(&step, &step).sqrt()];
         }
-        let slices = placed.into_iter().map(|(_, file, slice)| (file, slice)).collect();
-        Ok(Self { slices, step, is_by_number: false })
+        let mut series = Self::ordered(slices, axes, heights, step);
+        series.is_uneven = matches!(found, Evenness::Uneven { .. });
+        match found {
+            Evenness::Even => {}
+            Evenness::Uneven { most } => series.notes.push(ScanNote::Uneven { most }.into()),
+            Evenness::Given { least, greatest } => {
+                series.notes.push(ScanNote::GivenGaps { least, greatest }.into());
+            }
+        }
+        series.rungs = rungs.filter(|(rungs, count)| rungs.len() < *count);
+        if let Some((rungs, count)) = &series.rungs {
+            let note = ScanNote::EmptySlices { empty: count - rungs.len(), count: *count };
+            series.notes.push(note.into());
+        }
+        Ok(series)
     }
 
-    /// Slices in the order of their numbers, 1 apart.
-    fn by_number(mut slices: Vec<(String, Slice)>) -> Result<Self, SeriesError> {
-        let number = |slice: &Slice| slice.instance.unwrap_or_default();
-        slices.sort_by(|a, b| number(&a.1).total_cmp(&number(&b.1)));
-        let twice = slices.windows(2).find(|pair| number(&pair[0].1) == number(&pair[1].1));
-        if let Some([first, second]) = twice {
-            let number = number(&first.1);
-            let (first, second) = (first.0.clone(), second.0.clone());
-            return Err(SeriesError::SameNumber { first, second, number });
+    /// Slices in the order of their numbers, or of their files' names if they have none, 1 apart.
+    fn by_number(mut slices: Vec<Slice>, axes: Option<[[f64; 3]; 2]>) -> Result<Self, SeriesError> {
+        let number = |slice: &Slice| slice.plane.instance.unwrap_or_default();
+        let is_numbered = slices.iter().all(|slice| slice.plane.instance.is_some());
+        if is_numbered {
+            slices.sort_by(|a, b| number(a).total_cmp(&number(b)));
+            let twice = slices.windows(2).find(|pair| number(&pair[0]) == number(&pair[1]));
+            if let Some([first, second]) = twice {
+                let number = number(first);
+                let (first, second) = (first.name.clone(), second.name.clone());
+                return Err(SeriesError::SameNumber { first, second, number });
+            }
         }
-        let normal = slices[0].1.axes.and_then(normal);
         // the first may be placed without the others
-        slices.iter_mut().for_each(|(_, slice)| slice.position = None);
-        Ok(Self { slices, step: normal.unwrap_or([0.0, 0.0, 1.0]), is_by_number: true })
+        slices.iter_mut().for_each(|slice| slice.plane.position = None);
+        let step = axes.map_or([0.0, 0.0, 1.0], normal);
+        let heights = (0..slices.len()).map(|k| k as f64).collect();
+        let mut series = Self::ordered(slices, axes, heights, step);
+        let is_of_frames = series.slices.iter().any(|slice| slice.source.1 > 0);
+        let numbers = match (is_of_frames, is_numbered) {
+            (true, _) => "numbers of frames",
+            (false, true) => "instance numbers",
+            (false, false) => "files' names",
+        };
+        series.notes.push(ReadNote::ByNumber { numbers });
+        Ok(series)
     }
 }
 
 /// The world's axis along which slices are farthest apart.
-fn widest(slices: &[(String, Slice)]) -> [f64; 3] {
+fn widest(slices: &[Slice]) -> [f64; 3] {
     let spread = |k: usize| {
-        let places = || slices.iter().filter_map(|(_, slice)| Some(slice.position?[k]));
+        let places = || slices.iter().filter_map(|slice| Some(slice.plane.position?[k]));
         places().fold(f64::MIN, f64::max) - places().fold(f64::MAX, f64::min)
     };
     let mut normal = [0.0; 3];
@@ -131,83 +205,87 @@ fn widest(slices: &[(String, Slice)]) -> [f64; 3] {
     normal
 }
 
-/// The unit normal of two unit vectors at right angles.
-fn normal([x, y]: [[f64; 3]; 2]) -> Option<[f64; 3]> {
-    let is_unit = |v: &[f64; 3]| (dot(v, v) - 1.0).abs() <= 2.0 * SAME;
-    if !(is_unit(&x) && is_unit(&y) && dot(&x, &y).abs() <= SAME) {
+/// Two axes as unit vectors, if they are nearly so and nearly at right angles. The angle stays, and is noted with the frame.
+pub(super) fn unit_axes(axes: [[f64; 3]; 2]) -> Option<[[f64; 3]; 2]> {
+    let lengths = axes.map(|v| dot(&v, &v).sqrt());
+    let is_unit = lengths.iter().all(|length| (length - 1.0).abs() <= SQUARE);
+    let cosine = dot(&axes[0], &axes[1]);
+    if !(is_unit && cosine.abs() <= SQUARE) {
         return None;
     }
-    Some([x[1] * y[2] - x[2] * y[1], x[2] * y[0] - x[0] * y[2], x[0] * y[1] - x[1] * y[0]])
+    Some([axes[0].map(|a| a / lengths[0]), axes[1].map(|a| a / lengths[1])])
 }
 
-/// Checks that all slices are of one series.
-fn one_series(slices: &[(String, Slice)]) -> Result<(), SeriesError> {
-    let mut series = BTreeMap::new();
-    for (file, slice) in slices {
-        let (count, _) = series.entry(slice.series.as_str()).or_insert((0, file));
-        *count += 1;
-    }
-    if series.len() == 1 {
-        return Ok(());
-    }
-    let text = |(uid, (count, file)): (&&str, &(usize, &String))| {
-        format!("{uid} ({count} files, such as {file})")
-    };
-    let mut texts: Vec<_> = series.iter().take(NAMED).map(text).collect();
-    if series.len() > NAMED {
-        texts.push(format!("{} more", series.len() - NAMED));
-    }
-    Err(SeriesError::SeveralSeries { series: texts.join(", ") })
+/// The unit normal of two axes.
+pub(super) fn normal([x, y]: [[f64; 3]; 2]) -> [f64; 3] {
+    let normal = [x[1] * y[2] - x[2] * y[1], x[2] * y[0] - x[0] * y[2], x[0] * y[1] - x[1] * y[0]];
+    let length = dot(&normal, &normal).sqrt();
+    normal.map(|n| n / length)
 }
 
-/// Checks that a slice agrees with the first one.
-fn same(first: &str, head: &Slice, file: &str, slice: &Slice) -> Result<(), SeriesError> {
-    let near = |a: &[f64], b: &[f64]| {
-        a.iter().zip(b).all(|(a, b)| (a - b).abs() <= SAME * a.abs().max(b.abs()).max(1.0))
-    };
+/// Checks that a slice lies and is spaced as the first one.
+fn same(head: &Slice, slice: &Slice, given: GivenFrame) -> Result<(), SeriesError> {
+    let near = |a: &[f64], b: &[f64]| a.iter().zip(b).all(|(a, b)| (a - b).abs() <= SAME);
     let differs = |entry, found: String, expected: String| {
-        let (file, first) = (file.into(), first.into());
+        let (file, first) = (slice.name.clone(), head.name.clone());
         Err(SeriesError::Differs { file, entry, found, expected, first })
     };
-    let ([nx, ny], [mx, my]) = (slice.pixels.shape, head.pixels.shape);
-    if (nx, ny) != (mx, my) {
-        return differs("the shape", format!("{nx} × {ny}"), format!("{mx} × {my}"));
-    }
-    if slice.pixels != head.pixels {
-        return differs("samples of", slice.pixels.text(), head.pixels.text());
-    }
-    let axes = |slice: &Slice| slice.axes.unwrap_or_default();
-    if !near(axes(slice).as_flattened(), axes(head).as_flattened()) {
-        let text = |slice: &Slice| format!("{:?}", slice.axes.unwrap_or_default());
+    let axes = |slice: &Slice| slice.plane.axes.unwrap_or_default();
+    if !given.direction && !near(axes(slice).as_flattened(), axes(head).as_flattened()) {
+        let text = |slice: &Slice| format!("{:?}", axes(slice));
         return differs("the orientation", text(slice), text(head));
     }
-    let spacing = |slice: &Slice| slice.spacing.unwrap_or_default();
+    let spacing = |slice: &Slice| slice.plane.spacing.unwrap_or_default();
     let ([a, b], [c, d]) = (spacing(slice), spacing(head));
-    if (a - c).abs() > SAME * c || (b - d).abs() > SAME * d {
+    if !given.spacing && ((a - c).abs() > SAME * c || (b - d).abs() > SAME * d) {
         return differs("the spacing", format!("{a}, {b}"), format!("{c}, {d}"));
     }
     Ok(())
 }
 
-/// Checks that slices, given by their places in growing order and their files, are evenly spaced.
-fn even(places: &[(f64, &str)]) -> Result<(), SeriesError> {
+/// How evenly slices stand.
+enum Evenness {
+    /// As rounding leaves them.
+    Even,
+    /// Not quite: the farthest from its even place, in gaps.
+    Uneven { most: f64 },
+    /// At gaps that the caller's take the place of.
+    Given { least: f64, greatest: f64 },
+}
+
+/// Looks at the gaps between slices, given by their places in growing order.
+fn even(heights: &[f64], slices: &[Slice], is_given: bool) -> Result<Evenness, SeriesError> {
     // rounded as positions are, for messages
     let short = |x: f64| (x * 1e4).round() / 1e4;
-    let pairs = || places.windows(2).map(|w| (w[1].0 - w[0].0, w[0], w[1].1));
+    let pairs =
+        || heights.windows(2).enumerate().map(|(k, w)| (w[1] - w[0], w[0], &slices[k..k + 2]));
+    let names = |pair: &[Slice]| (pair[0].name.clone(), pair[1].name.clone());
     let mut gaps: Vec<f64> = pairs().map(|(gap, ..)| gap).collect();
     gaps.sort_by(f64::total_cmp);
     // of two in the middle the lesser, since a gap with a slice missing is the greater one
     let median = gaps[(gaps.len() - 1) / 2];
-    let uneven = |gap: f64| (gap - median).abs() > EVEN * median;
     let double = |gap: f64| gap <= EVEN * median || gap < LEAST_GAP;
-    if let Some((_, (place, first), second)) = pairs().find(|(gap, ..)| double(*gap)) {
-        let (first, second) = (first.to_owned(), second.to_owned());
+    if let Some((_, place, pair)) = pairs().find(|(gap, ..)| double(*gap)) {
+        let (first, second) = names(pair);
         return Err(SeriesError::Duplicate { first, second, place: short(place) });
     }
-    if let Some((gap, (place, first), second)) = pairs().find(|(gap, ..)| uneven(*gap)) {
-        let (first, second) = (first.to_owned(), second.to_owned());
-        let (place, gap, expected) = (short(place), short(gap), short(median));
-        return Err(SeriesError::Gap { first, second, place, gap, expected });
+    let mean = (heights[heights.len() - 1] - heights[0]) / (heights.len() - 1) as f64;
+    let off = |(k, height): (usize, &f64)| ((height - heights[0]) / mean - k as f64).abs();
+    let most = heights.iter().enumerate().map(off).fold(0.0, f64::max);
+    let is_near = |gap: f64| (gap - median).abs() <= UNEVEN * median;
+    if most <= EVEN {
+        return Ok(Evenness::Even);
     }
-    Ok(())
+    if most <= UNEVEN || gaps.iter().all(|&gap| is_near(gap)) {
+        return Ok(Evenness::Uneven { most });
+    }
+    if is_given {
+        let (least, greatest) = (short(gaps[0]), short(gaps[gaps.len() - 1]));
+        return Ok(Evenness::Given { least, greatest });
+    }
+    let farthest = pairs().find(|(gap, ..)| !is_near(*gap));
+    let Some((gap, place, pair)) = farthest else { return Ok(Evenness::Uneven { most }) };
+    let (first, second) = names(pair);
+    let (place, gap, expected) = (short(place), short(gap), short(median));
+    Err(SeriesError::Gap { first, second, place, gap, expected })
 }

@@ -1,0 +1,102 @@
+//! The tags that are looked at, as group and element in one number (PS3.6).
+
+pub const TRANSFER_SYNTAX: u32 = 0x0002_0010;
+pub const MODALITY: u32 = 0x0008_0060;
+pub const SERIES_DESCRIPTION: u32 = 0x0008_103e;
+pub const SPACING_BETWEEN: u32 = 0x0018_0088;
+pub const IMAGER_SPACING: u32 = 0x0018_1164;
+pub const SERIES: u32 = 0x0020_000e;
+pub const SERIES_NUMBER: u32 = 0x0020_0011;
+pub const INSTANCE: u32 = 0x0020_0013;
+pub const POSITION: u32 = 0x0020_0032;
+pub const ORIENTATION: u32 = 0x0020_0037;
+pub const PLANE_POSITION: u32 = 0x0020_9113;
+pub const PLANE_ORIENTATION: u32 = 0x0020_9116;
+pub const SAMPLES_PER_PIXEL: u32 = 0x0028_0002;
+pub const PHOTOMETRIC: u32 = 0x0028_0004;
+pub const FRAME_COUNT: u32 = 0x0028_0008;
+pub const ROWS: u32 = 0x0028_0010;
+pub const COLUMNS: u32 = 0x0028_0011;
+pub const PIXEL_SPACING: u32 = 0x0028_0030;
+pub const BITS_ALLOCATED: u32 = 0x0028_0100;
+pub const BITS_STORED: u32 = 0x0028_0101;
+pub const HIGH_BIT: u32 = 0x0028_0102;
+pub const IS_SIGNED: u32 = 0x0028_0103;
+pub const INTERCEPT: u32 = 0x0028_1052;
+pub const SLOPE: u32 = 0x0028_1053;
+pub const MODALITY_TABLE: u32 = 0x0028_3000;
+pub const TABLE_DESCRIPTOR: u32 = 0x0028_3002;
+pub const TABLE_DATA: u32 = 0x0028_3006;
+pub const PIXEL_MEASURES: u32 = 0x0028_9110;
+pub const VALUE_TRANSFORMATION: u32 = 0x0028_9145;
+pub const DETECTORS: u32 = 0x0054_0022;
+pub const SEGMENTATION_TYPE: u32 = 0x0062_0001;
+pub const SEGMENTS: u32 = 0x0062_0002;
+pub const SEGMENT_NUMBER: u32 = 0x0062_0004;
+pub const SEGMENT_LABEL: u32 = 0x0062_0005;
+pub const SEGMENT_IDENTIFICATION: u32 = 0x0062_000a;
+pub const REFERENCED_SEGMENT: u32 = 0x0062_000b;
+pub const GREATEST_FRACTION: u32 = 0x0062_000e;
+pub const FRAME_OFFSETS: u32 = 0x3004_000c;
+pub const DOSE_SCALING: u32 = 0x3004_000e;
+pub const SHARED_GROUPS: u32 = 0x5200_9229;
+pub const FRAME_GROUPS: u32 = 0x5200_9230;
+pub const EXTENDED_OFFSETS: u32 = 0x7fe0_0001;
+pub const FLOAT_PIXELS: u32 = 0x7fe0_0008;
+pub const DOUBLE_PIXELS: u32 = 0x7fe0_0009;
+pub const PIXELS: u32 = 0x7fe0_0010;
+pub const ITEM: u32 = 0xfffe_e000;
+pub const ITEM_END: u32 = 0xfffe_e00d;
+pub const SEQUENCE_END: u32 = 0xfffe_e0dd;
+
+/// The elements that are kept.
+pub const WANTED: [u32; 34] = [
+    TRANSFER_SYNTAX,
+    MODALITY,
+    SERIES_DESCRIPTION,
+    SPACING_BETWEEN,
+    IMAGER_SPACING,
+    SERIES,
+    SERIES_NUMBER,
+    INSTANCE,
+    POSITION,
+    ORIENTATION,
+    SAMPLES_PER_PIXEL,
+    PHOTOMETRIC,
+    FRAME_COUNT,
+    ROWS,
+    COLUMNS,
+    PIXEL_SPACING,
+    BITS_ALLOCATED,
+    BITS_STORED,
+    HIGH_BIT,
+    IS_SIGNED,
+    INTERCEPT,
+    SLOPE,
+    TABLE_DESCRIPTOR,
+    TABLE_DATA,
+    SEGMENTATION_TYPE,
+    SEGMENT_NUMBER,
+    SEGMENT_LABEL,
+    REFERENCED_SEGMENT,
+    GREATEST_FRACTION,
+    FRAME_OFFSETS,
+    DOSE_SCALING,
+    EXTENDED_OFFSETS,
+    FLOAT_PIXELS,
+    DOUBLE_PIXELS,
+];
+
+/// The sequences whose items are kept.
+pub const SEQUENCES: [u32; 10] = [
+    PLANE_POSITION,
+    PLANE_ORIENTATION,
+    MODALITY_TABLE,
+    PIXEL_MEASURES,
+    VALUE_TRANSFORMATION,
+    DETECTORS,
+    SEGMENTS,
+    SEGMENT_IDENTIFICATION,
+    SHARED_GROUPS,
+    FRAME_GROUPS,
+];
