@@ -103,32 +103,43 @@ fn apart<const D: usize>(
     kept
 }
 
-/// Points of pieces that are far enough from the atoms before them.
+/// Points of pieces that are far enough from the atoms before them. Each atom takes the points near it, so that those left
+/// need not look for atoms.
 fn add_on_surfaces<const D: usize>(
     atoms: &mut Vec<FeatureAtom<D>>,
     pieces: &Pieces<D>,
     bounds: &Bounds<D>,
     distance: &NominalDistance<D>,
 ) {
-    let mut bins = Bins::new(bounds, distance.least(), pieces.points().len());
-    atoms.iter().for_each(|atom| bins.push(&atom.position));
-    let mut order: Vec<usize> = (0..pieces.points().len()).collect();
-    // a fixed shuffle, so that no row of samples comes first
-    order.sort_by_key(|&i| (i as u64).wrapping_mul(0x9e37_79b9_7f4a_7c15).rotate_left(23));
     let all: Vec<_> = pieces.points().collect();
-    for i in order {
-        let (point, piece) = all[i];
-        let d = distance.at(&point.position);
-        let mut is_free = inner(bounds, d).contains(&point.position);
-        bins.near(&point.position, FIRST * d, |j| {
-            let other: &FeatureAtom<D> = &atoms[j];
-            let least = if other.pieces.contains(&piece) { FIRST } else { APART };
-            let squared = distance_squared(&other.position, &point.position);
-            is_free &= squared >= (least * d).powi(2);
+    let grid =
+        PointGrid::new(bounds, FIRST * distance.least(), all.iter().map(|(p, _)| p.position));
+    let mut is_taken: Vec<bool> = (all.par_iter().with_min_len(1 << 10))
+        .map(|(p, _)| !inner(bounds, distance.at(&p.position)).contains(&p.position))
+        .collect();
+    // what is near is told by d at the points, which is at most so many times as much as d at the atom
+    let rise = FIRST * distance.greatest_slope();
+    let most = if rise < 1.0 { 1.0 / (1.0 - rise) } else { f64::INFINITY };
+    let take = |atom: &FeatureAtom<D>, is_taken: &mut [bool]| {
+        let reach = FIRST * distance.greatest().min(most * distance.at(&atom.position));
+        grid.near(&atom.position, reach, |place, i| {
+            let least = if atom.pieces.contains(&all[i].1) { FIRST } else { APART };
+            is_taken[i] = is_taken[i]
+                || distance_squared(&atom.position, place) < (least * distance.at(place)).powi(2);
         });
-        if is_free {
-            bins.push(&point.position);
-            atoms.push(FeatureAtom::new(point.position, vec![piece], 2));
+    };
+    atoms.iter().for_each(|atom| take(atom, &mut is_taken));
+    // a fixed shuffle, so that no row of samples comes first
+    let mut order: Vec<u32> = (0..all.len() as u32).collect();
+    order.par_sort_unstable_by_key(|&i| {
+        u64::from(i).wrapping_mul(0x9e37_79b9_7f4a_7c15).rotate_left(23)
+    });
+    for i in order {
+        if !is_taken[i as usize] {
+            let (point, piece) = all[i as usize];
+            let atom = FeatureAtom::new(point.position, vec![piece], 2);
+            take(&atom, &mut is_taken);
+            atoms.push(atom);
         }
     }
 }

@@ -9,7 +9,7 @@ use crate::lattice::Lattice;
 use crate::mesh::{AtomEdit, Cells, ConnectError, Delaunay, Mesh};
 use crate::watch::{Phase, Watch, check};
 
-use super::facets::pieces_at;
+use super::facets::{pieces_at, pieces_of};
 use super::recover::{Mended, brought_near, crossings, edges_across, heights, mended};
 
 /// How often crossings are mended.
@@ -42,16 +42,13 @@ pub fn connect<const D: usize>(
     delaunay: &Delaunay<D>,
     watch: &mut dyn Watch,
 ) -> Result<(Lattice<D>, Mesh<D>), ConnectError> {
-    let lattice = brought_near(lattice, pieces);
+    let mut heights = heights(lattice.atoms(), pieces, distance);
+    let lattice = brought_near(lattice, &mut heights, pieces, distance);
     let mesh = delaunay.connect(lattice.atoms(), watch)?;
     check(watch, Phase::Connect, FIRST, None)?;
     let mut points = lattice.atoms().to_vec();
-    let mut atoms = Atoms {
-        heights: heights(&points, pieces, distance),
-        of_atoms: Vec::new(),
-        names: (0..points.len() as u32).collect(),
-        lattice,
-    };
+    let mut atoms =
+        Atoms { heights, of_atoms: Vec::new(), names: (0..points.len() as u32).collect(), lattice };
     let cells = mesh.corners().par_chunks_exact(D + 1);
     let mut found = crossings(edges_across(cells, &atoms.heights, pieces), &atoms, pieces);
     if found.is_empty() {
@@ -59,7 +56,7 @@ pub fn connect<const D: usize>(
     }
     let mut cells = Cells::new(&mesh);
     drop(mesh);
-    atoms.of_atoms = pieces_at(&points, pieces, atoms.lattice.bounds());
+    atoms.of_atoms = pieces_of(&points, &atoms.heights, pieces, atoms.lattice.bounds());
     for round in 0..ROUNDS {
         check(watch, Phase::Connect, FIRST + (1.0 - FIRST) * round as f64 / ROUNDS as f64, None)?;
         let mended = mended(&atoms, &found, pieces, distance);

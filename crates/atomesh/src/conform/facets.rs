@@ -36,25 +36,47 @@ pub(super) fn pieces_at<const D: usize>(
     pieces: &Pieces<D>,
     bounds: &Bounds<D>,
 ) -> Vec<Vec<u32>> {
-    let step = pieces.step();
-    let of = |p: &Point<D>| -> Vec<u32> {
-        let is_inner = bounds.freedom(p).count_ones() as usize == D;
-        let is_near_side = (0..D)
-            .any(|k| (p[k] - bounds.min[k]).min(bounds.max[k] - p[k]) < pieces.led_on() * step);
-        let on = if is_inner { ON } else { ON_AT_SIDE };
-        let reach = if is_near_side { pieces.led_on() + 2.0 } else { 3.0 };
-        let height = |piece: u32| {
-            let foot = pieces.foot_on(piece, p, reach * step)?;
-            let is_there = foot.beyond <= BEYOND * step;
-            is_there.then_some((piece, foot.signed_distance(p).abs() / step))
-        };
-        let near: Vec<(u32, f64)> =
-            pieces.near(p, reach * step).into_iter().filter_map(height).collect();
-        let least = near.iter().map(|(_, height)| *height).fold(f64::INFINITY, f64::min);
-        let most = if least <= on { on.max(ON_AT_CROSSING) } else { on };
-        near.into_iter().filter(|(_, height)| *height <= most).map(|(piece, _)| piece).collect()
-    };
+    let of = |p: &Point<D>| pieces_at_place(p, pieces, bounds);
     places.par_iter().with_min_len(1 << 8).map(of).collect()
+}
+
+/// The same, where the pieces near each place and how far it is from them are known.
+pub(super) fn pieces_of<const D: usize>(
+    places: &[Point<D>],
+    heights: &[Vec<(u32, f64)>],
+    pieces: &Pieces<D>,
+    bounds: &Bounds<D>,
+) -> Vec<Vec<u32>> {
+    let on = ON.max(ON_AT_SIDE) * pieces.step();
+    let of = |(p, heights): (&Point<D>, &Vec<(u32, f64)>)| {
+        let may_be_on = heights.iter().any(|(_, height)| height.abs() <= on);
+        if may_be_on { pieces_at_place(p, pieces, bounds) } else { Vec::new() }
+    };
+    places.par_iter().zip(heights).with_min_len(1 << 8).map(of).collect()
+}
+
+/// The pieces that a place lies on.
+fn pieces_at_place<const D: usize>(
+    p: &Point<D>,
+    pieces: &Pieces<D>,
+    bounds: &Bounds<D>,
+) -> Vec<u32> {
+    let step = pieces.step();
+    let is_inner = bounds.freedom(p).count_ones() as usize == D;
+    let is_near_side =
+        (0..D).any(|k| (p[k] - bounds.min[k]).min(bounds.max[k] - p[k]) < pieces.led_on() * step);
+    let on = if is_inner { ON } else { ON_AT_SIDE };
+    let reach = if is_near_side { pieces.led_on() + 2.0 } else { 3.0 };
+    let height = |piece: u32| {
+        let foot = pieces.foot_on(piece, p, reach * step)?;
+        let is_there = foot.beyond <= BEYOND * step;
+        is_there.then_some((piece, foot.signed_distance(p).abs() / step))
+    };
+    let near: Vec<(u32, f64)> =
+        pieces.near(p, reach * step).into_iter().filter_map(height).collect();
+    let least = near.iter().map(|(_, height)| *height).fold(f64::INFINITY, f64::min);
+    let most = if least <= on { on.max(ON_AT_CROSSING) } else { on };
+    near.into_iter().filter(|(_, height)| *height <= most).map(|(piece, _)| piece).collect()
 }
 
 /// Whether each place lies on a piece: atoms there stay where they are while a mesh is improved.

@@ -31,7 +31,7 @@ use crate::crests::Pieces;
 use crate::fields::{FieldsView, NominalDistance, ScalarField};
 use crate::geometry::{Bins, Point, PointGrid, distance_squared};
 use crate::image::Grid;
-use crate::lattice::{Lattice, LatticeError, Scatterer, fill_holes};
+use crate::lattice::{Lattice, LatticeError, Scatterer, fill_holes, fill_holes_near};
 use crate::optimize::{OptimizeError, OptimizeOptions, OptimizeReport, optimize};
 use crate::watch::{Cancelled, Watch};
 
@@ -105,6 +105,9 @@ pub fn conform<const D: usize>(
 ) -> Result<(Lattice<D>, OptimizeReport), ConformError> {
     let (bounds, distance) = (*lattice.bounds(), fields.distance);
     let atoms = feature_atoms(pieces, &bounds, distance, watch)?;
+    // crystals that grow around wells, or where d varies, leave holes where they meet
+    let is_whole =
+        distance.is_constant() && (0..lattice.len()).all(|i| lattice.temperature(i) > 0.0);
     let mut lattice = without_near(lattice, &atoms, distance, 0);
     let bits = |p: &Point<D>| p.map(f64::to_bits);
     let there: HashSet<[u64; D]> = lattice.atoms().iter().map(bits).collect();
@@ -112,10 +115,13 @@ pub fn conform<const D: usize>(
     {
         lattice.push(*position, bounds.freedom(position), 0.0);
     }
-    let lattice = fill_holes(scatterer, lattice, distance, FILL_ROUNDS, watch)?;
+    let met = atoms.iter().map(|atom| atom.position).collect::<Vec<_>>();
+    let lattice = match is_whole {
+        true => fill_holes_near(scatterer, lattice, &met, distance, FILL_ROUNDS, watch)?,
+        false => fill_holes(scatterer, lattice, distance, FILL_ROUNDS, watch)?,
+    };
     let lattice = without_near(lattice.along_curve(), &atoms, distance, 1);
     let options = OptimizeOptions { smoothing_steps: 0, ..options.clone() };
-    let met = atoms.iter().map(|atom| atom.position).collect::<Vec<_>>();
     let rest = without_met(fields.potential, pieces, &met, distance);
     let fields = FieldsView { potential: &rest, ..fields };
     let settled = optimize(lattice, fields, &options, watch)?;

@@ -294,14 +294,20 @@ fn is_near_other<const D: usize>(
 }
 
 /// Puts free atoms that are nearly on a piece onto it, and freezes them: as free ones they would be on neither side.
+/// `heights` are those of the atoms.
 pub(super) fn brought_near<const D: usize>(
     mut lattice: Lattice<D>,
+    of_atoms: &mut [Vec<(u32, f64)>],
     pieces: &Pieces<D>,
+    distance: &NominalDistance<D>,
 ) -> Lattice<D> {
     let (bounds, step) = (*lattice.bounds(), pieces.step());
     let to = |i: usize| -> Option<Point<D>> {
         let atom = &lattice.atoms()[i];
-        if lattice.temperature(i) == 0.0 || bounds.freedom(atom).count_ones() as usize != D {
+        if of_atoms[i].iter().all(|(_, height)| height.abs() > ON * step)
+            || lattice.temperature(i) == 0.0
+            || bounds.freedom(atom).count_ones() as usize != D
+        {
             return None;
         }
         let near = pieces.near(atom, 1.0);
@@ -312,14 +318,16 @@ pub(super) fn brought_near<const D: usize>(
         let is_inner = bounds.contains(&to) && bounds.freedom(&to).count_ones() as usize == D;
         is_inner.then_some(to)
     };
-    let places: Vec<Option<Point<D>>> =
-        (0..lattice.len()).into_par_iter().with_min_len(1 << 8).map(to).collect();
+    let moved: Vec<(usize, Point<D>)> = (0..lattice.len())
+        .into_par_iter()
+        .with_min_len(1 << 8)
+        .filter_map(|i| Some((i, to(i)?)))
+        .collect();
+    let places: Vec<Point<D>> = moved.iter().map(|(_, place)| *place).collect();
     let mut atoms = lattice.atoms().to_vec();
-    for (i, place) in places.into_iter().enumerate() {
-        if let Some(place) = place {
-            atoms[i] = place;
-            lattice.set_temperature(i, 0.0);
-        }
+    for ((i, place), heights) in moved.into_iter().zip(heights(&places, pieces, distance)) {
+        (atoms[i], of_atoms[i]) = (place, heights);
+        lattice.set_temperature(i, 0.0);
     }
     lattice.moved_to(atoms)
 }

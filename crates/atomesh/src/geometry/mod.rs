@@ -20,7 +20,7 @@ pub(crate) use bounds::{all_axes, axes_where};
 pub use compact::{BLOCK, compact_order};
 pub(crate) use order::shares;
 pub use order::{hilbert_order, lexicographic};
-pub(crate) use point_grid::PointGrid;
+pub(crate) use point_grid::{Block, PointGrid};
 pub use sets::Sets;
 pub use simplex::Simplex;
 

@@ -56,6 +56,11 @@ impl Default for Scatterer<3> {
 }
 
 impl<const D: usize> Scatterer<D> {
+    /// How holes are filled, in so many rounds at most.
+    pub(super) fn spread(&self, rounds: usize) -> Spread<'_, D> {
+        Spread { delaunay: &self.delaunay, limit: self.limit, rounds }
+    }
+
     /// The Delaunay mesh of atoms.
     pub(super) fn connect(
         &self,
@@ -136,12 +141,8 @@ pub fn fill_holes<const D: usize>(
     rounds: usize,
     watch: &mut dyn Watch,
 ) -> Result<Lattice<D>, LatticeError> {
-    if D == 3 {
-        for side in 0..6 {
-            fill_face(&mut lattice, Face { side, rounds, random: None }, distance, watch)?;
-        }
-    }
-    let spread = Spread { delaunay: &scatterer.delaunay, limit: scatterer.limit, rounds };
+    fill_faces(&mut lattice, distance, rounds, watch)?;
+    let spread = scatterer.spread(rounds);
     let field = |p: &Point<D>| distance.at(p);
     let mut atoms = lattice.atoms().to_vec();
     spread.complete(&mut atoms, lattice.bounds(), &field, watch)?;
@@ -149,6 +150,21 @@ pub fn fill_holes<const D: usize>(
         lattice.push(p, all_axes::<D>(), 1.0);
     }
     Ok(lattice)
+}
+
+/// [`fill_holes`] of the sides of a box in space, each as a plane of its own.
+pub(super) fn fill_faces<const D: usize>(
+    lattice: &mut Lattice<D>,
+    distance: &NominalDistance<D>,
+    rounds: usize,
+    watch: &mut dyn Watch,
+) -> Result<(), LatticeError> {
+    if D == 3 {
+        for side in 0..6 {
+            fill_face(lattice, Face { side, rounds, random: None }, distance, watch)?;
+        }
+    }
+    Ok(())
 }
 
 /// A side of a box in space, and how atoms are added there.
@@ -181,7 +197,7 @@ fn fill_face<const D: usize>(
         lattice.atoms().iter().filter(|p| p[normal] == level).map(|p| [p[a], p[b]]).collect();
     let plane = Bounds { min: [bounds.min[a], bounds.min[b]], max: [bounds.max[a], bounds.max[b]] };
     let planar = Scatterer::<2>::new();
-    let spread = Spread { delaunay: &planar.delaunay, limit: planar.limit, rounds };
+    let spread = planar.spread(rounds);
     let field = |p: &Point<2>| distance.at(&lift(p));
     let mut atoms = rim.clone();
     if let Some(random) = random {
@@ -194,11 +210,12 @@ fn fill_face<const D: usize>(
     Ok(())
 }
 
-struct Spread<'a, const D: usize> {
+/// How holes are found and filled.
+pub(super) struct Spread<'a, const D: usize> {
     delaunay: &'a Delaunay<D>,
     limit: f64,
     /// The most meshes to look at.
-    rounds: usize,
+    pub(super) rounds: usize,
 }
 
 /// Adds a random atom near the middle, unless there is one within d.
@@ -218,10 +235,10 @@ fn start<const D: usize>(
 }
 
 /// A place where an atom is missing, and how much: r/d.
-struct Hole<const D: usize> {
-    centre: Point<D>,
-    ratio: f64,
-    d: f64,
+pub(super) struct Hole<const D: usize> {
+    pub(super) centre: Point<D>,
+    pub(super) ratio: f64,
+    pub(super) d: f64,
 }
 
 impl<const D: usize> Spread<'_, D> {
@@ -249,7 +266,7 @@ impl<const D: usize> Spread<'_, D> {
     }
 
     /// Circumcentres inside the box whose r/d exceeds the limit, the worst first.
-    fn holes(
+    pub(super) fn holes(
         &self,
         atoms: &[Point<D>],
         bounds: &Bounds<D>,
@@ -282,7 +299,7 @@ impl<const D: usize> Spread<'_, D> {
     }
 
     /// Adds the holes' centres that are far enough from those added before.
-    fn plug(&self, holes: &[Hole<D>], bounds: &Bounds<D>, atoms: &mut Vec<Point<D>>) {
+    pub(super) fn plug(&self, holes: &[Hole<D>], bounds: &Bounds<D>, atoms: &mut Vec<Point<D>>) {
         // A centre keeps its circumradius free of atoms; of new ones, that much too.
         let radius = |hole: &Hole<D>| hole.ratio * hole.d;
         let least = holes.iter().map(radius).fold(f64::INFINITY, f64::min);

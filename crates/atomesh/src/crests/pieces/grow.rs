@@ -7,6 +7,7 @@ use rayon::prelude::*;
 use super::super::FeaturePoint;
 use super::link::{Alike, Around, linked_pairs};
 use super::meet::fill_in;
+use super::near::is_flat;
 use crate::geometry::{Bounds, PointGrid, Sets, difference, dot};
 
 /// Points this near to a piece's are explained by it, in mean steps; and those in the flank of its valley, where noise
@@ -124,9 +125,13 @@ pub(super) fn layered<const D: usize>(
     step: f64,
 ) -> Vec<usize> {
     let all = PointGrid::new(bounds, LAYER * step, points.iter().map(|point| point.position));
-    let is_beside = |i: usize| is_beside(points, i, roots[i], roots, &all, step);
-    let are_beside: Vec<bool> =
-        (0..points.len()).into_par_iter().with_min_len(1 << 8).map(is_beside).collect();
+    let are_beside = all.map_blocks(LAYER * step, |block, found: &mut Vec<bool>| {
+        // near a flat block no point is so far above another
+        let is_flat = is_flat(block, points, step);
+        found.extend(block.own().iter().map(|(_, i)| {
+            !is_flat && is_beside(points, *i as usize, roots[*i as usize], roots, &all, step)
+        }));
+    });
     let mut counts = vec![0; roots.len()];
     roots.iter().zip(are_beside).for_each(|(&root, is)| counts[root as usize] += usize::from(is));
     counts

@@ -5,31 +5,18 @@ use std::collections::VecDeque;
 use rayon::prelude::*;
 
 use super::super::FeaturePoint;
-use super::Cleanness;
-use super::grow::{EXPLAINED_ALONG, add_rest, explains, layered};
+use super::grow::{add_rest, layered};
 use super::meet::join_across;
-use crate::geometry::{Bounds, Point, PointGrid, Sets, difference, dot};
+use super::near::is_flat;
+use super::support::supported;
+use crate::geometry::{Block, Bounds, Point, PointGrid, Sets, difference, distance_squared, dot};
 use crate::image::Grid;
 
 /// How far linked points may be apart, over the diagonal of a sample's cell.
 const LINK: f64 = 1.2;
-/// Within how many mean steps points tell whether a point lies on one feature alone.
-pub(super) const SUPPORT: f64 = 4.0;
-/// The least share of the points near a point that lie on its plane.
-const LEAST_SUPPORT: f64 = 0.7;
-/// Points of one feature near each other have normals with at least this cosine, 21°.
-const ALIKE: f64 = 0.93;
-/// Points with other normals near a point are of a feature that meets the point's own.
-const NEXT: Next = Next { reach: 2.0, most: 0.12 };
-/// The same in space, where sheets cross along lines, and their valleys pass over into each other somewhere along these.
-const NEXT_IN_SPACE: Next = Next { reach: 2.5, most: 0.12 };
 /// In space points this near to a side of the image, in mean steps, say nothing: samples mirrored there turn their normals,
 /// and sheets at a slant pass over into each other. Pieces are led on to sides.
 const AT_SIDE: f64 = 1.0;
-/// How many points are asked for the share of those on clean features.
-const ASKED: usize = 20_000;
-/// How many of them are asked whether others explain them, which takes longer.
-const ASKED_FURTHER: usize = 2_000;
 /// Sets of fewer points, in space of fewer than the square, are linked anew with what is left.
 const SMALL: usize = 12;
 /// Sets of which so many points stand beside others, in the plane and in space, fork, and are linked again as small ones are.
@@ -39,15 +26,6 @@ const ACROSS: Alike = Alike { reach: 0.0, cosine: 0.96, slope: 0.08, slack: 0.4 
 const OVER_GAPS: Alike = Alike { reach: 0.0, cosine: 0.95, slope: 0.12, slack: 0.4 };
 /// Points whose links one task finds.
 const TASK: usize = 1 << 12;
-/// The fewest points on a point's plane, itself among them, in the plane; twice as many in space.
-const LEAST_ON: usize = 4;
-
-/// How near points with other normals count, in mean steps, and their greatest share.
-#[derive(Clone, Copy, Debug)]
-struct Next {
-    reach: f64,
-    most: f64,
-}
 
 /// The points of pieces, their normals turned to agree, with some more where pieces were joined; and the sets that
 /// make a piece each.
@@ -63,8 +41,9 @@ pub(super) fn linked_pieces<const D: usize>(
     let (mut points, mut others) = supported(points, &bounds, step);
     points.sort_by_key(|point| point.index);
     let mut sets = Sets::new(points.len());
-    let links = linked_pairs(&points, &bounds, &alike, step);
+    let links = spanning_pairs(&points, None, &bounds, &alike, step);
     links.iter().for_each(|&[i, j]| sets.join(i, j));
+    drop(links);
     let meetings: Vec<Point<D>> = others.iter().map(|point| point.position).collect();
     join_across(&mut points, &mut sets, &meetings, &ACROSS, &bounds, step);
     others.extend(take_unclear(&mut points, &mut sets, &bounds, step));
@@ -72,8 +51,7 @@ pub(super) fn linked_pieces<const D: usize>(
     add_rest(&mut points, &mut sets, &others, &bounds, reach, step);
     join_across(&mut points, &mut sets, &[], &OVER_GAPS, &bounds, step);
     let roots = sets.roots();
-    let mut links = linked_pairs(&points, &bounds, &alike, step);
-    links.retain(|pair| roots[pair[0] as usize] == roots[pair[1] as usize]);
+    let links = spanning_pairs(&points, Some(&roots), &bounds, &alike, step);
     turn(&mut points, &links);
     (points, sets)
 }
@@ -151,6 +129,56 @@ pub(super) fn linked_pairs<const D: usize>(
     tasks.collect::<Vec<_>>().concat()
 }
 
+/// Pairs of points that are on one line or plane, of the same root if roots are given: not all, but as many as connect
+/// what all of them connect.
+fn spanning_pairs<const D: usize>(
+    points: &[FeaturePoint<D>],
+    roots: Option<&[u32]>,
+    bounds: &Bounds<D>,
+    alike: &Alike,
+    step: f64,
+) -> Vec<[u32; 2]> {
+    let grid = PointGrid::new(bounds, alike.reach, points.iter().map(|point| point.position));
+    let is_wanted = |i: u32, j: u32| roots.is_none_or(|of| of[i as usize] == of[j as usize]);
+    let of = |block: &Block<'_, D>, pairs: &mut Vec<[u32; 2]>| {
+        let is_flat = is_flat(block, points, step);
+        let are_linked = |a: usize, b: usize| {
+            let [(p, i), (q, j)] = [block.near[a], block.near[b]];
+            let is_near = distance_squared(&p, &q) <= alike.reach * alike.reach;
+            is_near
+                && is_wanted(i, j)
+                && (is_flat || alike.holds(&points[i as usize], &points[j as usize], step))
+        };
+        let (first, count) = (block.own.start, block.own.len());
+        let mut parts = Sets::new(count);
+        for a in 1..count {
+            for b in 0..a {
+                let [of_a, of_b] = [a, b].map(|i| parts.root(i as u32));
+                if of_a != of_b && are_linked(first + a, first + b) {
+                    parts.join(of_a, of_b);
+                    pairs.push([block.near[first + b].1, block.near[first + a].1]);
+                }
+            }
+        }
+        let part_of = parts.roots();
+        // with each point of another block one pair for each part: the pair's other block has those of higher numbers
+        let mut last = vec![usize::MAX; count];
+        for (other, &(_, number)) in block.near.iter().enumerate() {
+            if block.own.contains(&other) {
+                continue;
+            }
+            for a in 0..count {
+                let (own, part) = (block.near[first + a].1, part_of[a] as usize);
+                if own < number && last[part] != other && are_linked(first + a, other) {
+                    last[part] = other;
+                    pairs.push([own, number]);
+                }
+            }
+        }
+    };
+    grid.visit_blocks(alike.reach, of).concat()
+}
+
 /// The points linked to each, and where those of each begin in the list.
 pub(super) struct Around {
     starts: Vec<u32>,
@@ -178,99 +206,6 @@ impl Around {
     pub(super) fn of(&self, i: u32) -> &[u32] {
         let i = i as usize;
         &self.linked[self.starts[i] as usize..self.starts[i + 1] as usize]
-    }
-}
-
-/// The points most of whose neighbours lie on their planes, and the others.
-fn supported<const D: usize>(
-    points: Vec<FeaturePoint<D>>,
-    bounds: &Bounds<D>,
-    step: f64,
-) -> (Vec<FeaturePoint<D>>, Vec<FeaturePoint<D>>) {
-    let next = if D == 2 { NEXT } else { NEXT_IN_SPACE };
-    let support = Support::new(&points, bounds, step, next);
-    let all = (0..points.len()).into_par_iter().with_min_len(1 << 8);
-    let is_kept: Vec<bool> = all.map(|i| support.of(i)).collect();
-    let (mut kept, mut others) = (Vec::new(), Vec::new());
-    for (point, is_kept) in points.into_iter().zip(is_kept) {
-        if is_kept {
-            kept.push(point);
-        } else {
-            others.push(point);
-        }
-    }
-    (kept, others)
-}
-
-/// How clean features are; of many points some are asked.
-pub(super) fn cleanness<const D: usize>(points: &[FeaturePoint<D>], grid: &Grid<D>) -> Cleanness {
-    let step = grid.step.iter().sum::<f64>() / D as f64;
-    let support = Support::new(points, &grid.bounds(), step, NEXT);
-    let share = |asked: usize, is: &(dyn Fn(usize) -> bool + Sync)| {
-        let stride = (points.len() / asked).max(1);
-        let all = (0..points.len().div_ceil(stride)).into_par_iter().with_min_len(1 << 6);
-        let count = all.clone().filter(|&i| is(i * stride)).count();
-        count as f64 / all.len().max(1) as f64
-    };
-    let clean = share(ASKED, &|i| support.of(i));
-    let unexplained = share(ASKED_FURTHER, &|i| !support.of(i) && !support.is_explained(i));
-    Cleanness { clean, unexplained }
-}
-
-/// Whether points lie on one feature alone.
-struct Support<'a, const D: usize> {
-    points: &'a [FeaturePoint<D>],
-    near: PointGrid<D>,
-    step: f64,
-    next: Next,
-}
-
-impl<'a, const D: usize> Support<'a, D> {
-    fn new(points: &'a [FeaturePoint<D>], bounds: &Bounds<D>, step: f64, next: Next) -> Self {
-        let positions = points.iter().map(|point| point.position);
-        Self { points, near: PointGrid::new(bounds, SUPPORT * step, positions), step, next }
-    }
-
-    /// Whether most neighbours of a point lie on its plane.
-    fn of(&self, i: usize) -> bool {
-        let (point, reach) = (&self.points[i], SUPPORT * self.step);
-        let (mut on, mut all, mut others, mut next) = (0usize, 0usize, 0usize, 0usize);
-        self.near.near(&point.position, reach, |position, j| {
-            let offset = difference(position, &point.position);
-            let squared = dot(&offset, &offset);
-            if squared > reach * reach {
-                return;
-            }
-            let is_next = squared <= (self.next.reach * self.step).powi(2);
-            next += usize::from(is_next);
-            if dot(&self.points[j].normal, &point.normal).abs() < ALIKE {
-                // of another feature, or around a bend
-                others += usize::from(is_next);
-                return;
-            }
-            all += 1;
-            let height = dot(&offset, &point.normal).abs();
-            on += usize::from(height <= 0.12 * squared.sqrt() + 0.3 * self.step);
-        });
-        on >= LEAST_ON * (D - 1)
-            && others as f64 <= self.next.most * next as f64
-            && on as f64 >= LEAST_SUPPORT * all as f64
-    }
-
-    /// Whether points that have support explain this one; in the plane, points of one line: where many cross there is no
-    /// room for rows of atoms on each, while sheets cross along lines, which are fewer.
-    fn is_explained(&self, i: usize) -> bool {
-        let (mut by, mut is_one) = (None, true);
-        let point = &self.points[i];
-        self.near.near(&point.position, EXPLAINED_ALONG * self.step, |_, j| {
-            let own = &self.points[j];
-            if i == j || D > 2 && by.is_some() || !explains(own, point, self.step) || !self.of(j) {
-                return;
-            }
-            let first = by.get_or_insert(own.normal);
-            is_one &= dot(first, &own.normal).abs() >= ALIKE;
-        });
-        by.is_some() && is_one
     }
 }
 
@@ -328,5 +263,39 @@ fn turn<const D: usize>(points: &mut [FeaturePoint<D>], links: &[[u32; 2]]) {
                 }
             }
         }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::super::near::tests::crossing_sheets;
+    use super::*;
+
+    fn spanning_pairs_connect_what_all_pairs_do<const D: usize>() {
+        let alike = Alike { reach: 1.2 * (D as f64).sqrt(), cosine: 0.8, slope: 0.4, slack: 0.35 };
+        for noise in [0.02, 0.15] {
+            let (points, bounds) = crossing_sheets::<D>(noise, 9);
+            let all = linked_pairs(&points, &bounds, &alike, 1.0);
+            let roots: Vec<u32> = (0..points.len() as u32).map(|i| i % 2).collect();
+            for roots in [None, Some(&roots[..])] {
+                let wanted =
+                    |[i, j]: &[u32; 2]| roots.is_none_or(|of| of[*i as usize] == of[*j as usize]);
+                let some = spanning_pairs(&points, roots, &bounds, &alike, 1.0);
+                let numbers = |pairs: &mut dyn Iterator<Item = [u32; 2]>| {
+                    let mut sets = Sets::new(points.len());
+                    pairs.for_each(|[i, j]| sets.join(i, j));
+                    sets.numbers()
+                };
+                let expected = numbers(&mut all.iter().copied().filter(wanted));
+                assert_eq!(numbers(&mut some.iter().copied()), expected);
+                assert!(some.len() <= all.len() && some.iter().all(wanted));
+            }
+        }
+    }
+
+    #[test]
+    fn fewer_pairs_connect_the_same_points() {
+        spanning_pairs_connect_what_all_pairs_do::<2>();
+        spanning_pairs_connect_what_all_pairs_do::<3>();
     }
 }

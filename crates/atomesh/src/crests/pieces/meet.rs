@@ -6,7 +6,9 @@ use rayon::prelude::*;
 
 use super::super::FeaturePoint;
 use super::grow::{EXPLAINED, EXPLAINED_ALONG};
-use super::link::{Alike, SUPPORT};
+use super::link::Alike;
+use super::near::Columns;
+use super::support::SUPPORT;
 use crate::geometry::{Bins, Bounds, Point, PointGrid, Sets, difference, distance_squared, dot};
 
 /// How far pieces on one line or plane may be apart and still be joined, in mean steps.
@@ -103,24 +105,29 @@ fn ends<const D: usize>(
         });
         found
     };
-    let is_lopsided = |i: usize| {
-        let (mut sum, mut count) = ([0.0; D], 0.0);
-        grid.near(&points[i].position, SUPPORT * step, |place, j| {
-            let offset = difference(place, &points[i].position);
-            if roots[i] == roots[j] && dot(&offset, &offset) <= (SUPPORT * step).powi(2) {
-                (0..D).for_each(|k| sum[k] += offset[k]);
-                count += 1.0;
+    // 0: no end
+    let reaches = grid.map_blocks(SUPPORT * step, |block, reaches: &mut Vec<f64>| {
+        let (mut own_root, mut columns) = (u32::MAX, None);
+        for (place, i) in block.own() {
+            let root = roots[*i as usize];
+            if is_at_meeting(&points[*i as usize]) {
+                reaches.push(BRIDGE * step);
+                continue;
             }
-        });
-        dot(&sum, &sum).sqrt() > LOPSIDED * step * count
-    };
-    let reach = |i: usize| {
-        let reach = if is_at_meeting(&points[i]) { Some(BRIDGE) } else { None };
-        let reach = reach.or_else(|| is_lopsided(i).then_some(GAP))?;
-        Some((i, reach * step))
-    };
-    let mut found: Vec<(usize, f64)> =
-        (0..points.len()).into_par_iter().with_min_len(1 << 8).filter_map(reach).collect();
+            let columns = match &mut columns {
+                Some(columns) if own_root == root => columns,
+                other => {
+                    own_root = root;
+                    other.insert(Columns::of(block, points, |j| roots[j as usize] == root))
+                }
+            };
+            let (sum, count) = columns.ways(place, SUPPORT * step);
+            let is_lopsided = dot(&sum, &sum).sqrt() > LOPSIDED * step * count;
+            reaches.push(if is_lopsided { GAP * step } else { 0.0 });
+        }
+    });
+    let found = reaches.into_iter().enumerate().filter(|(_, reach)| *reach > 0.0);
+    let mut found: Vec<(usize, f64)> = found.collect();
     let mut seen = HashSet::new();
     found.retain(|&(i, _)| {
         let cube = points[i].position.map(|x| (x / (SPARSE * step)) as i64);
@@ -266,6 +273,9 @@ fn fill<const D: usize>(
     bounds: &Bounds<D>,
     step: f64,
 ) {
+    if bridges.is_empty() {
+        return;
+    }
     let spacing = FILL * step;
     let mut bins = Bins::of(bounds, step, points.iter().map(|point| point.position));
     for &[i, j] in bridges {

@@ -12,17 +12,18 @@
 mod grow;
 mod link;
 mod meet;
+mod near;
 mod patch;
-
-use std::collections::HashSet;
+mod support;
 
 use rayon::prelude::*;
 
 use super::FeaturePoint;
 use crate::geometry::{Bounds, Point, PointGrid, Sets, difference, distance_squared, dot};
 use crate::image::Grid;
-use link::{cleanness, linked_pieces};
+use link::linked_pieces;
 use patch::{Cloud, Patch};
+use support::cleanness;
 
 /// The width of cubes in which one patch stands for all of a piece, in mean steps, and how far from a patch's middle
 /// its piece still is what it says.
@@ -30,6 +31,8 @@ const PATCH: f64 = 2.0;
 const PATCH_REACH: f64 = 2.6;
 /// The width of cubes in which one point stands for all of a piece, in mean steps.
 const COARSE: f64 = 4.0;
+/// The width of the rows in which these are looked for, about as far as pieces are asked for, in mean steps.
+const COARSE_ROW: f64 = 16.0;
 /// How often a foot is looked for on the patch nearest to the last.
 const FOOT_ROUNDS: usize = 3;
 /// How far from the nearest point of a piece a place may be along the piece and still be on it, in mean steps: in the
@@ -136,8 +139,8 @@ impl<const D: usize> Pieces<D> {
         let (patches, of_patches) = patches(&cloud);
         let patch_grid = PointGrid::new(bounds, 2.0 * PATCH * step, patches.iter().map(|p| p.at));
         let first = firsts(&points, &of_points, COARSE * step);
-        let coarse =
-            PointGrid::new(bounds, COARSE * step, first.iter().map(|&i| points[i].position));
+        let positions = first.iter().map(|&i| points[i].position);
+        let coarse = PointGrid::new(bounds, COARSE_ROW * step, positions);
         let of_coarse = first.iter().map(|&i| of_points[i]).collect();
         Self {
             points,
@@ -253,7 +256,8 @@ impl<const D: usize> Pieces<D> {
         wanted: impl Fn(u32) -> bool,
     ) -> Option<usize> {
         let wanted = |i: usize| wanted(self.of_patches[i].0);
-        nearest(&self.patch_grid, p, 1.5 * self.step, reach + PATCH * self.step, wanted)
+        let found = self.patch_grid.nearest(p, reach + PATCH * self.step, wanted);
+        found.map(|(patch, _)| patch)
     }
 
     /// The foot of `p` on a patch, or on those beside it.
@@ -311,35 +315,7 @@ impl<const D: usize> Pieces<D> {
     fn gap(&self, piece: u32, x: &Point<D>) -> f64 {
         let most = GREATEST_GAP * self.step;
         let is_own = |i: usize| self.of_points[i] == piece;
-        let found = nearest(&self.grid, x, END * self.step, most, is_own);
-        found.map_or(most, |i| distance_squared(&self.points[i].position, x).sqrt())
-    }
-}
-
-/// The number of the point nearest to `p` of those wanted within `reach`; the first of equals. Points within `first` are
-/// looked at first.
-fn nearest<const D: usize>(
-    grid: &PointGrid<D>,
-    p: &Point<D>,
-    first: f64,
-    reach: f64,
-    wanted: impl Fn(usize) -> bool,
-) -> Option<usize> {
-    let mut within = first.min(reach);
-    loop {
-        let mut best = (within * within, None);
-        grid.near(p, within, |place, i| {
-            let found = (distance_squared(place, p), Some(i));
-            let is_better = found.0 < best.0
-                || found.0 == best.0 && best.1.is_none_or(|other: usize| i < other);
-            if is_better && wanted(i) {
-                best = found;
-            }
-        });
-        if best.1.is_some() || within >= reach {
-            return best.1;
-        }
-        within = (1.7 * within).min(reach);
+        self.grid.nearest(x, most, is_own).map_or(most, |(_, squared)| squared.sqrt())
     }
 }
 
@@ -367,12 +343,15 @@ fn patches<const D: usize>(cloud: &Cloud<'_, D>) -> (Vec<Patch<D>>, Vec<(u32, bo
 
 /// The first point of each piece in each cube of this width.
 fn firsts<const D: usize>(points: &[FeaturePoint<D>], of_points: &[u32], width: f64) -> Vec<usize> {
-    let mut seen = HashSet::new();
-    let is_first = |&i: &usize| {
-        let cube = points[i].position.map(|x| (x / width) as i32);
-        seen.insert((cube, of_points[i]))
+    let place = |(i, point): (usize, &FeaturePoint<D>)| {
+        (point.position.map(|x| (x / width) as i32), of_points[i], i as u32)
     };
-    (0..points.len()).filter(is_first).collect()
+    let mut places: Vec<([i32; D], u32, u32)> = points.par_iter().enumerate().map(place).collect();
+    places.par_sort_unstable();
+    places.dedup_by_key(|(cube, piece, _)| (*cube, *piece));
+    let mut first: Vec<usize> = places.into_iter().map(|(_, _, i)| i as usize).collect();
+    first.par_sort_unstable();
+    first
 }
 
 /// Unit vectors along a line or plane; in the plane only the first counts.

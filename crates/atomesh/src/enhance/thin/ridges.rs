@@ -78,7 +78,7 @@ impl<const D: usize> Finder<D> for Ridges {
         for sign in signs {
             let fill = |start: usize, out: &mut [f32]| {
                 unit.fill(start, out);
-                out.iter_mut().for_each(|v| *v = sign * (*v - background));
+                out.iter_mut().for_each(|v| *v = sign * (*v - background) + 0.0); // no −0
             };
             crests.extend(crossings(fill, &grid, scale, visit, watch)?);
         }
@@ -102,7 +102,8 @@ pub(in crate::enhance) fn valleys<const D: usize>(
     let grid = grid.in_least_steps();
     let fill = |start: usize, out: &mut [f32]| {
         let values = &potential[start..start + out.len()];
-        out.iter_mut().zip(values).for_each(|(out, b)| *out = -b);
+        // no −0, so that the stream can tell rows of zeros
+        out.iter_mut().zip(values).for_each(|(out, b)| *out = 0.0 - b);
     };
     let visit = |row: &Row<D>, crests: &mut Vec<FeaturePoint<D>>| {
         for (x, &depth) in row.average.iter().enumerate() {
