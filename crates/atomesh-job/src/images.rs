@@ -76,9 +76,6 @@ fn refusal(error: ReadError) -> JobError {
             let parts: Vec<_> = parts.filter(|(_, n)| *n > 1).map(|(s, n)| part(s, n)).collect();
             JobError::misuse(&reason).advise(format!("{}, chooses one", parts.join(" and ")))
         }
-        ReadReason::Segments { .. } => {
-            JobError::misuse(&reason).advise("--segment NAME or its number chooses one")
-        }
         ReadReason::Series(ref series)
             if matches!(
                 **series,
