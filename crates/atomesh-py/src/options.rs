@@ -302,6 +302,24 @@ fn spelt(option: &str, value: &Bound<'_, PyAny>) -> PyResult<Value> {
             Ok(Value::String(names?.join(",")))
         }
         "direction" => Ok(json!(crate::arrays::numbers(value)?)),
+        "threshold" if !listed => Ok(json!([value.extract::<f64>()?])),
+        "void" | "only" if listed => {
+            let labels: PyResult<Vec<String>> =
+                value.try_iter()?.map(|label| Ok(label?.extract::<i32>()?.to_string())).collect();
+            Ok(Value::String(labels?.join(",")))
+        }
+        "void" | "only" => Ok(Value::String(value.extract::<i32>()?.to_string())),
+        "size_of" | "material" => {
+            let by_label = value.cast::<PyDict>()?.iter();
+            let spelt = |(label, of): (Bound<'_, PyAny>, Bound<'_, PyAny>)| -> PyResult<String> {
+                let label = label.extract::<i32>()?;
+                match of.extract::<f64>() {
+                    Ok(one) => Ok(format!("{label}={one}")),
+                    Err(_) => pair(&of).map(|two| format!("{label}={},{}", two[0], two[1])),
+                }
+            };
+            Ok(json!(by_label.map(spelt).collect::<PyResult<Vec<String>>>()?))
+        }
         _ => to_json(value),
     }
 }
@@ -313,7 +331,7 @@ fn pair(value: &Bound<'_, PyAny>) -> PyResult<[f64; 2]> {
     <[f64; 2]>::try_from(ends).map_err(|ends| {
         errors::input(
             value.py(),
-            format!("{} numbers; expected two, least and greatest", ends.len()),
+            format!("{} numbers; expected two", ends.len()),
         )
     })
 }

@@ -55,6 +55,10 @@ ODD = {  # where the placeholder does not tell, or Python takes more than the co
     "crop": "str | Sequence[tuple[float, float]]",
     "points_per_wavelength": "float",
     "order": "Literal[1, 2]",
+    "threshold": "float | Sequence[float]",
+    **dict.fromkeys(("void", "only"), "int | Sequence[int]"),
+    "size_of": "Mapping[int, float]",
+    "material": "Mapping[int, tuple[float, float]]",
     "msh": 'Literal["4.1", "2.2"]',
     **dict.fromkeys(FIELDS, "ImageLike"),
 }
@@ -63,12 +67,15 @@ MORE = {  # what Python takes beside what the help says
     "beta": "In Python: a number, or β(x) as an image.",
     "features": 'In Python also ["faults", "horizons"] and {"faults": 1, "horizons": 0.5}.',
     "crop": "In Python also ((x0, x1), (y0, y1)).",
+    "size_of": "In Python {label: d}.",
+    "material": "In Python {region: (E, nu)}.",
     **dict.fromkeys(FIELDS, "In Python: a file, or what `Image.of` takes."),
 }
 KEYWORDS = {"mesh": "kind", "seed-point": "fixed"}  # in help; what has other names is found out, not listed
 WORDS = {
     "IMAGE": "the image",
-    "May be given many times": "Any number of them, shape (n, D)",
+    "starts there. May be given many times": "starts there. Any number of them, shape (n, D)",
+    ". May be given many times": "",
     "SHARE is how much": "The value is how much",
     "; 0.4 if left out": "; 0.4 is usual",
     "0.000000000001": "1e-12",
