@@ -328,7 +328,8 @@ pub fn is_path(value: &Bound<'_, PyAny>) -> bool {
 ///     The file, or the folder of a DICOM series or of TIFF or PNG slices.
 /// **options
 ///     How it is read and placed, as the command's options: `spacing`, `origin`, `direction`, `channel`, `time`,
-///     `volume`, `array`, `series`, `segment`, `labels_by_color`, `vertical`, `sample_format` ...; for raw samples `shape` (x first), `dtype`, `byte_order`,
+///     `volume`, `array`, `series`, `segment`, `labels_by_color`, `vertical`, `sample_format` ...; for raw samples `shape`
+///     (x first), `dtype`, `byte_order`,
 ///     `offset`. See `atomesh.FrameOptions`. Also `meaning`: "brightness" (default), "labels" or "mask": what the values
 ///     are, which decides what is read of colours and rounded; and `progress`.
 ///

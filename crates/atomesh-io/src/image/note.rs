@@ -507,10 +507,6 @@ impl ReadNote {
                 | Self::UsualResolution { .. }
                 | Self::Chosen { .. }
                 | Self::AtDetector { .. }
-                | Self::Sheared { .. }
-                | Self::LevelSlice { .. }
-                | Self::ObliqueSlice { .. }
-                | Self::Segment { .. }
         ) && self.parts_are_a_warning()
     }
 
@@ -655,33 +651,6 @@ impl fmt::Display for ReadNote {
                 f,
                 "slices have no position; they are in the order of their {numbers}, evenly spaced"
             ),
-            Self::Sheared { first, second, degrees, distance } => write!(
-                f,
-                "axes {} and {} meet at {degrees:.4} degrees in the file; the nearest ones at right angles \
-                 are taken, which moves samples by {distance:.4} at most",
-                ["x", "y", "z"][*first],
-                ["x", "y", "z"][*second]
-            ),
-            Self::LevelSlice { z } => {
-                write!(f, "a single slice is read as flat; it lies in the plane z = {z}")
-            }
-            Self::ObliqueSlice { origin, axes: [x, y] } => {
-                let listed = |numbers: &[f64; 3]| {
-                    let words: Vec<_> = numbers.iter().map(f64::to_string).collect();
-                    format!("({})", words.join(", "))
-                };
-                write!(
-                    f,
-                    "a single slice is read as flat, in its own plane: its first sample is at {} in the world, \
-                     its axes run along {} and {}",
-                    listed(origin),
-                    listed(x),
-                    listed(y)
-                )
-            }
-            Self::Segment { name, number, count } => {
-                write!(f, "segment {number} of {count}, {name:?}: 1 inside, 0 outside")
-            }
             Self::Scan(note) => note.fmt(f),
             _ => self.write_stack(f),
         }

@@ -79,8 +79,7 @@ fn check_pflotran<const D: usize>(frame: &Frame<D>, delaunay: &Delaunay<D>, thic
     let depth = if D == 2 { thickness } else { 1.0 };
     let mut lines = texts[0].lines();
     assert_eq!(lines.next(), Some(&*format!("CELLS {}", mesh.cell_count())));
-    let centers: Vec<Vec<f64>> =
-        lines.by_ref().take(mesh.cell_count()).map(numbers).collect();
+    let centers: Vec<Vec<f64>> = lines.by_ref().take(mesh.cell_count()).map(numbers).collect();
     for (cell, (row, measure)) in centers.iter().zip(mesh.measures()).enumerate() {
         assert_eq!((row[0], row[4]), ((cell + 1) as f64, measure * depth));
         if D == 2 {

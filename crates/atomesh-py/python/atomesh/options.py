@@ -277,15 +277,12 @@ class FrameOptions(TypedDict, total=False):
     array : str
         NPZ, VTI and VTK files of several arrays: which one, by its name. Default: the only one that is an image; of
         VTI and VTK the file's scalars, or the first.
-    segment : str
-        Segmentations (.seg.nrrd): which segment, by its name or its number from 1; samples are 1 in it and 0
-        elsewhere. Default: all as labels; segments that overlap are an error.
     series : str
         DICOM folders of several series: which one, by its UID, its number or its description. Default: several are an
         error.
     segment : str
-        Segmentations (DICOM): which segment, by its name or its number from 1; samples are 1 in it and 0 elsewhere.
-        Default: all as labels; segments that overlap are an error.
+        Segmentations (.seg.nrrd, DICOM): which segment, by its name or its number from 1; samples are 1 in it and 0
+        elsewhere. Default: all as labels; segments that overlap are an error.
     labels_by_color : bool
         Colour images as labels: one for each colour, black 0, the others from 1 by ascending red, green, blue.
         Default: False, colours are an error; grey values and indices of palettes are labels as they are.
