@@ -112,9 +112,9 @@ impl JobError {
         self
     }
 
-    /// The same, about a file, unless it is about one already.
+    /// The same, about a file, unless it is about one already, or what it is about is in memory and has no name.
     pub fn about(mut self, file: &Path) -> Self {
-        if self.kind != ErrorKind::Cancelled {
+        if self.kind != ErrorKind::Cancelled && !file.as_os_str().is_empty() {
             self.file.get_or_insert_with(|| file.into());
         }
         self

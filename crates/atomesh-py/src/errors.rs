@@ -17,13 +17,16 @@ pub const RENAMED: [(&str, &str); 7] = [
 ];
 
 /// Options of commands that are no sections of a run's options.
-const OTHERS: [&str; 16] = [
+const OTHERS: [&str; 19] = [
     "side",
     "source",
     "sink",
     "barrier",
     "multiplier",
     "below",
+    "close_gaps",
+    "min_facets",
+    "min_measure",
     "permeability",
     "porosity",
     "order",

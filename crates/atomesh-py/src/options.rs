@@ -3,9 +3,11 @@
 //! A keyword's value goes through the same deserialization as a configuration's, so that what is understood, and what
 //! is refused, is the same. Images and arrays may stand where the command takes a file.
 
+use atomesh::run::Size;
 use atomesh_io::image::AnyImage;
 use atomesh_job::mesh::{GivenField, GivenFields};
 use atomesh_job::options::RunConfig;
+use atomesh_job::values::SizeValue;
 use atomesh_job::{Dimension, JobError};
 use pyo3::exceptions::PyTypeError;
 use pyo3::prelude::*;
@@ -161,7 +163,16 @@ impl Wishes {
             let value = value.repr().map_or("?".into(), |repr| repr.to_string());
             errors::input(py, format!("{key}={value}: {e}"))
         })?;
+        let (size, frequency) = (self.run.lattice.size, self.run.lattice.frequency);
         self.run = partial.or(std::mem::take(&mut self.run));
+        // one goes before the other, but lengths may bound those of waves
+        let is_range = |size: &SizeValue| matches!(size.0, Size::Range { .. });
+        let lattice = &mut self.run.lattice;
+        match option {
+            "size" if lattice.size.as_ref().is_some_and(is_range) => lattice.frequency = frequency,
+            "frequency" => lattice.size = size.filter(is_range),
+            _ => {}
+        }
         Ok(())
     }
 
@@ -328,12 +339,8 @@ fn spelt(option: &str, value: &Bound<'_, PyAny>) -> PyResult<Value> {
 fn pair(value: &Bound<'_, PyAny>) -> PyResult<[f64; 2]> {
     let ends: PyResult<Vec<f64>> = value.try_iter()?.map(|end| end?.extract()).collect();
     let ends = ends?;
-    <[f64; 2]>::try_from(ends).map_err(|ends| {
-        errors::input(
-            value.py(),
-            format!("{} numbers; expected two", ends.len()),
-        )
-    })
+    <[f64; 2]>::try_from(ends)
+        .map_err(|ends| errors::input(value.py(), format!("{} numbers; expected two", ends.len())))
 }
 
 /// A number, text, or list of these as JSON.

@@ -143,7 +143,8 @@ class LatticeOptions(TypedDict, total=False):
         (curvature), or near them (distance). Default: density.
     frequency : float
         Greatest frequency f of waves in 1/s, where the image holds their velocity v: edges are v / f /
-        `points_per_wavelength` long; replaces `size`.
+        `points_per_wavelength` long, within `size` (min, max) if that is given too. Where v is 0 (shear waves in
+        water), MIN is taken.
     points_per_wavelength : float
         Edges in a wavelength, above 0; with `frequency`. Default: 5.
     beta : float | ImageLike
@@ -153,7 +154,8 @@ class LatticeOptions(TypedDict, total=False):
     lattice : Literal["hexagonal", "bcc", "fcc", "random"]
         Lattice to start from: hexagonal (2-D); bcc, fcc (3-D); random (both). Default: hexagonal in 2-D, bcc in 3-D.
     spacing_factor : float
-        Share γ of the edge length that an atom of the starting lattice keeps free of others, 0.1 to 1. Default: 0.8.
+        Share γ of the edge length that an atom of the starting lattice keeps free of others, 0.1 to 1. Where the
+        length varies, a small share makes edges shorter than it: less than a third of it is refused. Default: 0.8.
     fixed : Sequence[Numbers] | npt.NDArray[Any]
         Atom that stays where it is, such as a well, in world coordinates; growth starts there. Any number of them,
         shape (n, D). The command's --seed-point.
@@ -245,9 +247,24 @@ class RegionOptions(TypedDict, total=False):
     least_island : int
         Connected groups of cells of one label, if of fewer cells than this, take the label of their neighbours.
         Default: 0.
+    threshold : float | Sequence[float]
+        Values of the image, ascending, that part it into phases, in place of `labels`: label 0 below the first, 1
+        from it up to the next, and so on. With `denoise`, of the image without its noise. The phases' boundaries are
+        the features, unless `features` says others.
+    void : int | Sequence[int]
+        Labels that are left out: the mesh ends at their smooth outline, as at that of a mask.
+    only : int | Sequence[int]
+        The labels that are meshed; all others are left out, as by `void`.
+    size_of : Mapping[int, float]
+        Edge length wanted where a label is, in lattice units; elsewhere it is `size`, and between them it grows by 1
+        for each 4 units of way. In Python {label: d}.
     """
 
     least_island: int
+    threshold: float | Sequence[float]
+    void: int | Sequence[int]
+    only: int | Sequence[int]
+    size_of: Mapping[int, float]
 
 
 class FrameOptions(TypedDict, total=False):
@@ -263,6 +280,10 @@ class FrameOptions(TypedDict, total=False):
     direction : npt.ArrayLike
         World directions of the axes as a matrix, row by row: its columns are the axes x, y (and z). Default: the
         image's, else the world's axes.
+    y_up : bool
+        Let y grow upwards: the rows of the image run down from the greatest y, so that photographs (PNG, JPEG, TIFF)
+        stand upright in programs whose y points up, such as Abaqus and Gmsh. The box stays. Default: False, rows run
+        along y as they come.
     crop : str | Sequence[tuple[float, float]]
         Box of interest in world coordinates, rounded outward to whole samples. In Python also ((x0, x1), (y0, y1)).
     fill : float
@@ -319,6 +340,7 @@ class FrameOptions(TypedDict, total=False):
     spacing: Numbers
     origin: Numbers
     direction: npt.ArrayLike
+    y_up: bool
     crop: str | Sequence[tuple[float, float]]
     fill: float
     channel: int
@@ -498,6 +520,13 @@ class OutputOptions(WorkOptions, total=False):
     order : Literal[1, 2]
         Order of the cells: 2 writes triangles of 6 and tetrahedra of 10 points, curved on a mask's outline. Default:
         1.
+    section : Literal["solid", "plane-stress", "plane-strain", "axisymmetric"]
+        Abaqus: write what the cells are, in sections of one material for each region, called as the region: solid
+        (3-D), plane-stress or plane-strain of thickness 1, or axisymmetric about the y axis (2-D). Default: plane
+        stress in 2-D, and no sections.
+    material : Mapping[int, tuple[float, float]]
+        Abaqus: write the elastic material of a region beside its section: Young's modulus E and Poisson's ratio NU.
+        In Python {region: (E, nu)}.
     tag_features : float
         Tag facets along which the mean of b is at most this (-1 to 1, such as -0.2) as features, beside the sides of
         the box; `features` offers more choice. Not in .vtk and .npz.
@@ -524,6 +553,8 @@ class OutputOptions(WorkOptions, total=False):
     msh: Literal["4.1", "2.2"]
     msh_text: bool
     order: Literal[1, 2]
+    section: Literal["solid", "plane-stress", "plane-strain", "axisymmetric"]
+    material: Mapping[int, tuple[float, float]]
     tag_features: float
     regions: bool
     connections: PathLike
