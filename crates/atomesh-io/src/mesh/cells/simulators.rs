@@ -312,7 +312,7 @@ mod tests {
     #[test]
     fn names_are_different_and_begin_with_a_letter() {
         assert_eq!(tough_name(0), "AAA00");
-        assert_eq!(tough_name(3_599), "AA900");
+        assert_eq!(tough_name(3_599), "AA999");
         let last = tough_name(MOST_TOUGH_ELEMENTS - 1);
         assert_eq!(last, "Z9999");
         let names: std::collections::BTreeSet<String> = (0..200_000).map(tough_name).collect();
