@@ -23,11 +23,17 @@ pub use read::{AnyCells, LoadedCells, read_cells};
 pub use simulators::{MOST_TOUGH_ELEMENTS, Simulator, SimulatorFiles, write_simulator};
 pub use vtu::{write_cells_vtu, write_cells_vtu_with};
 
+use std::io::Write;
+use std::path::PathBuf;
+
 use atomesh::features::FeatureFaces;
 use atomesh::image::Frame;
 use atomesh::mesh::PolyMesh;
+use atomesh::watch::{Phase, Watch, check};
 
+use super::error::MeshWriteError;
 use super::provenance::Provenance;
+use crate::atomic_file::AtomicFile;
 
 /// Polygons or polyhedra in world coordinates, with what is known of them.
 #[derive(Clone, Copy, Debug)]
@@ -47,4 +53,22 @@ impl<const D: usize> CellData<'_, D> {
     pub(super) fn metadata(&self) -> String {
         super::metadata::encode(Some(self.frame), Some(self.provenance))
     }
+}
+
+/// Writes texts to files. All appear only when all are written.
+///
+/// # Errors
+/// If a file cannot be written, or the watch ends the work.
+fn write_texts(texts: &[(&PathBuf, String)], watch: &mut dyn Watch) -> Result<(), MeshWriteError> {
+    let mut finished = Vec::new();
+    for (n, (path, text)) in texts.iter().enumerate() {
+        check(watch, Phase::Write, n as f64 / texts.len() as f64, None)?;
+        let mut file = AtomicFile::create(path)?;
+        file.write_all(text.as_bytes())?;
+        finished.push(file);
+    }
+    for file in finished {
+        file.commit()?;
+    }
+    Ok(())
 }

@@ -8,15 +8,13 @@
 //! bottoms are not, so the files are for confined flow (`icelltype` 0).
 
 use std::fmt::Write as _;
-use std::io::Write;
 use std::path::{Path, PathBuf};
 
 use atomesh::mesh::{Connection, PolyMesh, connections};
-use atomesh::watch::{Phase, Watch, check};
+use atomesh::watch::Watch;
 
 use super::super::error::MeshWriteError;
-use super::CellData;
-use crate::atomic_file::AtomicFile;
+use super::{CellData, write_texts};
 
 /// MODFLOW reads lines of any length; people do not.
 const NUMBERS_A_LINE: usize = 8;
@@ -78,17 +76,7 @@ pub fn write_modflow<const D: usize>(
     if let Some(path) = &files.hfb {
         texts.push((path, hfb(&faces, rock, D)));
     }
-    let mut finished = Vec::new();
-    for (n, (path, text)) in texts.iter().enumerate() {
-        check(watch, Phase::Write, n as f64 / texts.len() as f64, None)?;
-        let mut file = AtomicFile::create(path)?;
-        file.write_all(text.as_bytes())?;
-        finished.push(file);
-    }
-    for file in finished {
-        file.commit()?;
-    }
-    Ok(())
+    write_texts(&texts, watch)
 }
 
 /// Appends a block.

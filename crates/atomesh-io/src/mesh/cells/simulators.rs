@@ -8,17 +8,15 @@
 //! area down, but for OPM, whose grids hold geometry alone.
 
 use std::fmt::Write as _;
-use std::io::Write;
 use std::path::{Path, PathBuf};
 
 use atomesh::geometry::Point;
 use atomesh::mesh::{Connection, PolyMesh, boundary_connections, connections, side_name};
-use atomesh::watch::{Phase, Watch, check};
+use atomesh::watch::Watch;
 
 use super::super::error::MeshWriteError;
-use super::CellData;
 use super::modflow::Rock;
-use crate::atomic_file::AtomicFile;
+use super::{CellData, write_texts};
 
 /// A program that takes cells and what connects them.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -76,17 +74,7 @@ pub fn write_simulator<const D: usize>(
     let cells = Cells { mesh: data.mesh, rock, faces: connections(data.mesh) };
     let mut texts = vec![(&files.grid, cells.grid(files.simulator))];
     texts.extend(files.sides.iter().zip(cells.sides()));
-    let mut finished = Vec::new();
-    for (n, (path, text)) in texts.iter().enumerate() {
-        check(watch, Phase::Write, n as f64 / texts.len() as f64, None)?;
-        let mut file = AtomicFile::create(path)?;
-        file.write_all(text.as_bytes())?;
-        finished.push(file);
-    }
-    for file in finished {
-        file.commit()?;
-    }
-    Ok(())
+    write_texts(&texts, watch)
 }
 
 /// Cells with the faces between them.
