@@ -41,6 +41,8 @@ def draw(rng):
     shape = [int(rng.integers(1 if rng.random() < 0.03 else 2, most)) for _ in range(dimension)]
     if rng.random() < 0.15:  # thin
         shape[int(rng.integers(dimension))] = int(rng.integers(2, 5))
+    if dimension == 3 and shape[-1] in (3, 4):
+        shape[-1] = 5  # three or four samples along x are taken for colours, with a warning
     places = np.meshgrid(*[np.arange(n, dtype=float) for n in shape], indexing="ij")
     kind = rng.choice(["constant", "noise", "line", "lines", "ball", "step", "grains", "ramp", "spikes"])
     values = np.zeros(shape)
