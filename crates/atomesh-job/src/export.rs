@@ -255,6 +255,8 @@ impl<const D: usize> Export<'_, D> {
             .map(|cell| problem.permeability.scalar(cell).expect("it is no tensor"))
             .collect();
         let data = CellData { mesh, features, frame, provenance };
+        let (top, thickness) = (self.request.top, self.request.thickness);
+        let rock = Rock { permeability: &k, multipliers, top, thickness };
         session.write_together(|group, session| {
             let written = match self.format.staged(D, group)? {
                 ExportFormat::Connections(files) => {
@@ -262,13 +264,9 @@ impl<const D: usize> Export<'_, D> {
                     (dimension.files.connections_with_flow)(&files, &data, flow, session)
                 }
                 ExportFormat::Disv(files) | ExportFormat::Disu(files) => {
-                    let (top, thickness) = (self.request.top, self.request.thickness);
-                    let rock = Rock { permeability: &k, multipliers, top, thickness };
                     (dimension.files.modflow)(&files, &data, &rock, session)
                 }
                 ExportFormat::Simulator(files) => {
-                    let (top, thickness) = (self.request.top, self.request.thickness);
-                    let rock = Rock { permeability: &k, multipliers, top, thickness };
                     (dimension.files.simulator)(&files, &data, &rock, session)
                 }
             };

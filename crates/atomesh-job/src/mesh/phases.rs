@@ -9,7 +9,7 @@ use rayon::prelude::*;
 use crate::error::JobError;
 use crate::options::RunConfig;
 use crate::session::Session;
-use crate::values::{LabelSize, Labels, Text};
+use crate::values::{LabelSize, Labels, Numbers, Text};
 
 /// Labels by the thresholds that options give; `None` if they give none.
 ///
@@ -20,10 +20,10 @@ pub(super) fn by_thresholds<const D: usize>(
     image: &Image<D>,
     session: &mut Session<'_>,
 ) -> Result<Option<Image<D>>, JobError> {
-    let Some(thresholds) = &run.regions.threshold else { return Ok(None) };
-    let thresholds = &thresholds.0;
+    let Some(given) = &run.regions.threshold else { return Ok(None) };
+    let Numbers(thresholds) = given;
     if !thresholds.is_sorted_by(|a, b| a < b) || thresholds.is_empty() {
-        let message = format!("--threshold {}; expected ascending values", words(thresholds));
+        let message = format!("--threshold {given}; expected ascending values");
         return Err(JobError::misuse(message));
     }
     if thresholds.len() > 254 {
@@ -45,20 +45,12 @@ pub(super) fn by_thresholds<const D: usize>(
         (0..samples.len()).into_par_iter().map(|at| label(samples.get(at))).collect();
     if labels.windows(2).all(|pair| pair[0] == pair[1]) {
         let range = samples.range();
-        let message = format!(
-            "--threshold {} parts nothing: values are {} to {}",
-            words(thresholds),
-            range.min,
-            range.max
-        );
+        let message =
+            format!("--threshold {given} parts nothing: values are {} to {}", range.min, range.max);
         return Err(JobError::content(message).about_any(run.input.shown()));
     }
     let labels = image.clone().with_samples(Samples::U8(labels.into()));
     labels.map(Some).map_err(JobError::content)
-}
-
-fn words(numbers: &[f64]) -> String {
-    numbers.iter().map(f64::to_string).collect::<Vec<_>>().join(",")
 }
 
 /// The mask without the labels that options leave out; `mask` if they leave none out.

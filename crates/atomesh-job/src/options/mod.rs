@@ -185,11 +185,8 @@ impl RunConfig {
             // the options of features have no part in the run
             defaults.features = PotentialOptions::default();
         }
-        let mut given = self;
-        if given.regions.threshold.is_some() {
-            given.follow_labels();
-        }
-        given.or(defaults)
+        let features = self.followed();
+        Self { features, ..self }.or(defaults)
     }
 
     /// The options that the core takes.
@@ -198,10 +195,7 @@ impl RunConfig {
     /// [`JobError`] if a seed point has another number of coordinates, or a value from a configuration
     /// is out of its range.
     pub fn mesh_options<const D: usize>(&self) -> Result<MeshOptions<D>, JobError> {
-        let mut features = self.features.clone();
-        if self.regions.threshold.is_some() {
-            features.features.get_or_insert(Text(Features::Labels.into())); // boundaries between phases
-        }
+        let features = self.followed();
         let (lattice, moves) = (&self.lattice, &self.optimize);
         let default = MeshOptions::<D>::for_kind(lattice.mesh.unwrap_or_default());
         let seeds = lattice.seed_point.iter().flatten();
@@ -279,6 +273,15 @@ impl RunConfig {
     /// Makes the boundaries between labels the features, unless others are asked for.
     pub fn follow_labels(&mut self) {
         self.features.features.get_or_insert(Text(Features::Labels.into()));
+    }
+
+    /// The options of features: those of an image that is parted into phases follow the boundaries between these.
+    fn followed(&self) -> PotentialOptions {
+        let phases = self.regions.threshold.as_ref().map(|_| Text(Features::Labels.into()));
+        PotentialOptions {
+            features: self.features.features.clone().or(phases),
+            ..self.features.clone()
+        }
     }
 }
 
