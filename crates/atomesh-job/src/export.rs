@@ -2,10 +2,11 @@
 
 use std::path::{Path, PathBuf};
 
-use atomesh_flow::{FlowError, Problem};
+use atomesh::mesh::PolyMesh;
+use atomesh_flow::{FlowError, FlowMethod, Problem, Setting};
 use atomesh_io::mesh::cells::{
-    AnyCells, CellData, ConnectionFiles, Flow, LoadedCells, MOST_TOUGH_ELEMENTS, ModflowFiles,
-    Rock, Simulator, SimulatorFiles, read_cells,
+    AnyCells, ConnectionFiles, Flow, LoadedCells, MOST_TOUGH_ELEMENTS, ModflowFiles, NO_CELL, Rock,
+    Simulator, SimulatorFiles, read_cells,
 };
 use atomesh_io::output_group::OutputGroup;
 
@@ -108,13 +109,19 @@ impl ExportFormat {
         }
     }
 
-    /// The same files of cells of so many axes, written to where the group says.
-    fn staged(&self, dimension: usize, group: &mut OutputGroup) -> Result<Self, JobError> {
+    /// The same files of these cells, written to where the group says.
+    fn staged<const D: usize>(
+        &self,
+        cells: &LoadedCells<D>,
+        group: &mut OutputGroup,
+    ) -> Result<Self, JobError> {
+        let has_wells = cells.wells.iter().any(|cell| *cell != NO_CELL);
         let mut modflow = |files: &ModflowFiles| {
             Ok(ModflowFiles {
                 grid: files::stage(&files.grid, group)?,
                 npf: files::stage(&files.npf, group)?,
                 hfb: files::stage_any(&files.hfb, group)?,
+                wells: files::stage_any(&files.wells.clone().filter(|_| has_wells), group)?,
             })
         };
         match self {
@@ -124,9 +131,10 @@ impl ExportFormat {
             Self::Simulator(files) => Ok(Self::Simulator(SimulatorFiles {
                 simulator: files.simulator,
                 grid: files::stage(&files.grid, group)?,
-                sides: (files.sides.iter().take(2 * dimension))
+                sides: (files.sides.iter().take(2 * D))
                     .map(|side| files::stage(side, group))
                     .collect::<Result<_, _>>()?,
+                wells: files::stage_any(&files.wells.clone().filter(|_| has_wells), group)?,
             })),
         }
     }
@@ -170,6 +178,42 @@ pub fn export_file(
     }
 }
 
+/// The least share of what sealed faces would let through with which heads of compartments that nothing else holds are
+/// right to three digits in double precision, rounded up to a power of ten. `open` are transmissibilities of open faces.
+///
+/// Of a compartment of n cells whose faces would let ΣT through, the equations' least eigenvalue is about m ΣT / n, m being
+/// the share, and the greatest is below twice the greatest sum of a cell's transmissibilities. Rounding errors of the
+/// solution are as large as their ratio times 2⁻⁵².
+fn least_share<const D: usize>(mesh: &PolyMesh<D>, setting: &Setting<D>, open: &[f64]) -> f64 {
+    const DIGITS: f64 = 1e-3;
+    let of_cell = |cell: u32| setting.compartment_of()[cell as usize] as usize;
+    let count = setting.compartments().len();
+    let (mut cells, mut across, mut sums) =
+        (vec![0_usize; count], vec![0.0; count], vec![0.0; mesh.cell_count()]);
+    setting.compartment_of().iter().for_each(|&number| cells[number as usize] += 1);
+    for (face, (&neighbour, &t)) in mesh.neighbours().iter().zip(open).enumerate() {
+        let both = [mesh.owners()[face], neighbour];
+        both.iter().for_each(|&cell| sums[cell as usize] += t);
+        if setting.multipliers()[face] == 0.0 {
+            let [a, b] = both.map(of_cell);
+            if a != b {
+                across[a] += t;
+                across[b] += t;
+            }
+        }
+    }
+    let greatest = |number: usize| {
+        let own = sums.iter().zip(setting.compartment_of());
+        let own = own.filter(|(_, of)| **of as usize == number);
+        own.fold(0.0, |most: f64, (sum, _)| most.max(*sum))
+    };
+    let least = (0..count).filter(|&number| across[number] > 0.0).map(|number| {
+        let ratio = 2.0 * greatest(number) * cells[number] as f64 / across[number];
+        ratio * f64::EPSILON / DIGITS
+    });
+    10f64.powf(least.fold(0.0, f64::max).log10().ceil()).min(1.0)
+}
+
 /// Cells that are exported.
 struct Export<'a, const D: usize> {
     request: &'a ExportRequest,
@@ -179,14 +223,25 @@ struct Export<'a, const D: usize> {
 
 impl<const D: usize> Export<'_, D> {
     /// MODFLOW finds no heads in cells that are sealed off from all given ones, and ends without saying which.
-    fn warn_of_compartments(&self, count: usize, session: &mut Session<'_>) {
+    fn warn_of_compartments(
+        &self,
+        setting: &Setting<D>,
+        method: &FlowMethod<D>,
+        session: &mut Session<'_>,
+    ) -> Result<(), FlowError> {
+        let count = setting.compartments().len();
         if count > 1 {
+            let mesh = &self.cells.mesh;
+            let open = vec![1.0; mesh.inner_face_count()];
+            let open = (method.transmissibilities)(mesh, setting.permeability(), &open)?;
+            let share = least_share(mesh, setting, &open);
             let text = format!(
                 "sealed features part the cells into {count} compartments; MODFLOW 6 needs a given head in each, or a \
-                 share above 0, such as 1e-9"
+                 share of {share:e} or more, with which heads are right to three digits"
             );
             session.warn(Some(&self.request.output), text);
         }
+        Ok(())
     }
 
     /// Refuses what a simulator's files do not hold, and says what they leave out.
@@ -236,7 +291,7 @@ impl<const D: usize> Export<'_, D> {
         dimension: &Dimension<D>,
         session: &mut Session<'_>,
     ) -> Result<ExportSummary, JobError> {
-        let LoadedCells { mesh, features, fields, frame, provenance, .. } = self.cells;
+        let LoadedCells { mesh, features, fields, .. } = self.cells;
         let method = &dimension.flow;
         let grid = (method.grid_of_cells)(mesh, Some(features));
         let barriers = self.request.barrier.iter().map(|spec| spec.barrier().clone()).collect();
@@ -245,7 +300,7 @@ impl<const D: usize> Export<'_, D> {
         let about = |e: FlowError| JobError::from(e).about(&self.request.cells);
         let setting = (method.setting)(&problem, &grid).map_err(about)?;
         if matches!(self.format, ExportFormat::Disv(_) | ExportFormat::Disu(_)) {
-            self.warn_of_compartments(setting.compartments().len(), session);
+            self.warn_of_compartments(&setting, method, session).map_err(about)?;
         }
         let multipliers = setting.multipliers();
         self.check_simulator(multipliers, session)?;
@@ -254,11 +309,11 @@ impl<const D: usize> Export<'_, D> {
         let k: Vec<f64> = (0..mesh.cell_count())
             .map(|cell| problem.permeability.scalar(cell).expect("it is no tensor"))
             .collect();
-        let data = CellData { mesh, features, frame, provenance };
+        let data = self.cells.data();
         let (top, thickness) = (self.request.top, self.request.thickness);
         let rock = Rock { permeability: &k, multipliers, top, thickness };
         session.write_together(|group, session| {
-            let written = match self.format.staged(D, group)? {
+            let written = match self.format.staged(self.cells, group)? {
                 ExportFormat::Connections(files) => {
                     let flow = Flow { permeability: &k, transmissibilities: &found };
                     (dimension.files.connections_with_flow)(&files, &data, flow, session)

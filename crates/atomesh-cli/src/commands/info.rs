@@ -6,10 +6,10 @@ use std::path::PathBuf;
 use atomesh::geometry::Bounds;
 use atomesh::image::{Frame, Units};
 use atomesh::measure::{ShapeReport, shape};
-use atomesh::mesh::{PolyReport, feature_name, side_name};
+use atomesh::mesh::{PointGroup, PolyReport, feature_name, side_name, well_name};
 use atomesh::watch::Watch;
 use atomesh_io::image::{AnyImage, LoadedImage};
-use atomesh_io::mesh::cells::LoadedCells;
+use atomesh_io::mesh::cells::{LoadedCells, NO_CELL};
 use atomesh_io::mesh::{LoadedMesh, MeshFormat, OwnedField, Provenance};
 use atomesh_job::mesh_file::{self, MeshFile};
 use atomesh_job::options::FrameOptions;
@@ -151,6 +151,14 @@ fn mesh_text<const D: usize>(
         let named = groups.iter().map(|group| format!("{} {}", group.name, group.facets.len()));
         line(&mut text, "facets", listed(named, groups.len()));
     }
+    let groups = loaded.tags.point_groups();
+    if !groups.is_empty() {
+        let place = |group: &PointGroup| match group.points[..] {
+            [point] => format!("{} at {}", group.name, list(&mesh.points()[point as usize])),
+            _ => format!("{} {}", group.name, group.points.len()),
+        };
+        line(&mut text, "points of", listed(groups.iter().map(place), groups.len()));
+    }
     if let Some(regions) = loaded.tags.regions() {
         let ids = regions.ids();
         line(&mut text, "regions", listed(ids.iter().map(|&id| regions.name(id)), ids.len()));
@@ -160,7 +168,7 @@ fn mesh_text<const D: usize>(
 }
 
 fn cells_text<const D: usize>(cells: &LoadedCells<D>, dimension: &Dimension<D>) -> String {
-    let LoadedCells { mesh, features, fields, skipped_fields, frame, provenance } = cells;
+    let LoadedCells { mesh, features, fields, skipped_fields, frame, provenance, wells } = cells;
     let mut text = String::new();
     line(&mut text, "points", mesh.points().len());
     line(&mut text, dimension.voronoi_cells, mesh.cell_count());
@@ -178,6 +186,13 @@ fn cells_text<const D: usize>(cells: &LoadedCells<D>, dimension: &Dimension<D>) 
     }
     let named = groups.iter().map(|(name, count)| format!("{name} {count}"));
     line(&mut text, "facets", listed(named, groups.len()));
+    if !wells.is_empty() {
+        let known = wells.iter().zip(1..).filter(|(cell, _)| **cell != NO_CELL);
+        let place = |(&cell, number): (&u32, u32)| {
+            format!("{} at {}", well_name(number), list(&mesh.centers()[cell as usize]))
+        };
+        line(&mut text, "cells of", listed(known.map(place), wells.len()));
+    }
     origin_text(&mut text, Some(frame), Some(provenance));
     text
 }

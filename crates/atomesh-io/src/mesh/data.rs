@@ -6,7 +6,7 @@ use atomesh::mesh::{Mesh, Quadratic, Tags};
 use super::cell_fields::{CellFields, VectorField};
 use super::field::{Field, MeshDataError, Values, check_field};
 use super::inp::Sections;
-use super::metadata;
+use super::metadata::{self, KnownAs};
 use super::provenance::Provenance;
 
 /// A mesh in world coordinates, with what is known at its points and cells; borrowed, since meshes
@@ -178,6 +178,17 @@ impl<'a, const D: usize> MeshData<'a, D> {
 
     /// Frame and provenance as JSON, the text that all mesh files carry; the same for the same data.
     pub(super) fn metadata(&self) -> String {
-        metadata::encode(self.frame, self.provenance)
+        self.metadata_with_numbers(&KnownAs::default())
+    }
+
+    /// The same with the numbers by which a format knows regions and groups whose own it cannot hold.
+    pub(super) fn metadata_with_numbers(&self, known_as: &KnownAs) -> String {
+        let points = self.tags.map_or(&[][..], Tags::point_groups);
+        metadata::encode_with_tags(self.frame, self.provenance, points, known_as)
+    }
+
+    /// The number of the group that each point that is written is in, 0 for none; empty if there are no groups.
+    pub(super) fn group_of_points(&self) -> Vec<u32> {
+        self.tags.map_or_else(Vec::new, |tags| tags.group_of_points(self.nodes().len()))
     }
 }

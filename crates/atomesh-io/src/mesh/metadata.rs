@@ -1,9 +1,13 @@
 //! The frame and the provenance of a mesh as one JSON text, which every format carries.
 
 use atomesh::image::Frame;
+use atomesh::mesh::PointGroup;
 use serde_json::{Value, json};
 
 use super::provenance::Provenance;
+
+/// The array of the number of the group that each point is in, 0 for none, in formats that name their arrays.
+pub(super) const POINT_GROUP: &str = "point_group";
 
 /// The name under which formats that name their arrays keep the text.
 pub(super) const NAME: &str = "atomesh";
@@ -15,13 +19,19 @@ pub(super) struct KnownAs {
     pub groups: Vec<(u32, i32)>,
 }
 
-/// The text with the numbers by which a format knows regions and groups whose own it cannot hold.
-pub(super) fn encode_with_numbers<const D: usize>(
+/// The text with the names of groups of points, which few formats hold, and the numbers by which a format knows
+/// regions and groups whose own it cannot hold.
+pub(super) fn encode_with_tags<const D: usize>(
     frame: Option<&Frame<D>>,
     provenance: Option<&Provenance>,
+    point_groups: &[PointGroup],
     known_as: &KnownAs,
 ) -> String {
     let mut object = object(frame, provenance);
+    if !point_groups.is_empty() {
+        let names: Vec<_> = point_groups.iter().map(|group| (group.id, &group.name)).collect();
+        object.insert("point_groups".into(), json!(names));
+    }
     if !known_as.regions.is_empty() {
         object.insert("regions".into(), json!(known_as.regions));
     }
@@ -88,6 +98,12 @@ impl Metadata {
             regions: serde_json::from_value(list("regions")).unwrap_or_default(),
             groups: serde_json::from_value(list("groups")).unwrap_or_default(),
         }
+    }
+
+    /// The numbers and names of groups of points.
+    pub fn point_groups(&self) -> Vec<(u32, String)> {
+        let names = self.0.get("point_groups").cloned().unwrap_or_default();
+        serde_json::from_value(names).unwrap_or_default()
     }
 
     /// The units of the world's axes.

@@ -4,7 +4,7 @@ use atomesh::mesh::{Mesh, Tags};
 
 use super::field::OwnedField;
 use super::loaded::{AnyMesh, LoadedMesh};
-use super::metadata::Metadata;
+use super::metadata::{Metadata, POINT_GROUP};
 use super::read_error::MeshReadError;
 use super::tags::RawTags;
 
@@ -111,14 +111,28 @@ impl Parts {
         let renumber = |c: &mut u32| *c = number.get(*c as usize).copied().unwrap_or(u32::MAX);
         self.tags.edges.iter_mut().for_each(|(edge, _)| edge.iter_mut().for_each(renumber));
         self.tags.triangles.iter_mut().for_each(|(t, _)| t.iter_mut().for_each(renumber));
+        self.tags.points.iter_mut().for_each(|(point, _)| renumber(point));
         for field in &mut self.fields {
             let mut at = 0..;
             field.values.retain(|_| at.next().is_some_and(|i| i < number.len() && is_kept(i)));
         }
     }
 
+    /// Takes the groups of points that atomesh has written as a field.
+    fn take_point_groups(&mut self) {
+        let is_ours = !self.metadata.point_groups().is_empty();
+        let place = self.fields.iter().position(|field| field.name == POINT_GROUP);
+        if let (true, Some(place)) = (is_ours, place) {
+            let field = self.fields.remove(place);
+            let groups: Vec<u32> = field.values.iter().map(|&group| group as u32).collect();
+            self.tags.points_of(&groups);
+        }
+        self.tags.name_points(&self.metadata);
+    }
+
     /// A mesh of the tetrahedra, if there are any, or else of the triangles.
     pub fn into_mesh(mut self) -> Result<AnyMesh, MeshReadError> {
+        self.take_point_groups();
         self.drop_middles();
         if !self.tetrahedra.is_empty() {
             let cell_fields = self.fields_of(4);

@@ -2,8 +2,9 @@
 
 use std::collections::{BTreeMap, HashMap, HashSet};
 
-use atomesh::mesh::{FacetGroup, Mesh, Regions, Tags};
+use atomesh::mesh::{FacetGroup, Mesh, PointGroup, Regions, Tags};
 
+use super::metadata::Metadata;
 use super::read_error::MeshReadError;
 
 /// The name of the one region that formats need where a mesh has facet groups but no regions.
@@ -61,12 +62,60 @@ pub(super) struct RawTags {
     pub tetrahedron_regions: Vec<i32>,
     /// Whether the file names regions at all.
     pub has_regions: bool,
+    /// Points, each with the number of a group.
+    pub points: Vec<(u32, i32)>,
     /// Names of groups: their dimension, number and name.
     pub names: Vec<(usize, i32, String)>,
 }
 
 impl RawTags {
-    /// The tags of a mesh of edges and triangles, or of triangles and tetrahedra; and the number of facets left
+    /// Puts points into the groups of these numbers, one for each point; 0 is none.
+    pub fn points_of(&mut self, groups: &[u32]) {
+        let in_group = groups.iter().enumerate().filter(|(_, group)| **group > 0);
+        self.points.extend(in_group.map(|(point, &group)| (point as u32, group as i32)));
+    }
+
+    /// Gives groups of points the names that atomesh has given them, and their numbers where the file has others
+    /// beside the names.
+    pub fn name_points(&mut self, metadata: &Metadata) {
+        for (id, name) in metadata.point_groups() {
+            let id = id as i32;
+            let known = self.names.iter_mut().find(|(dim, _, known)| *dim == 0 && *known == name);
+            match known {
+                Some((_, number, _)) => {
+                    let number = std::mem::replace(number, id);
+                    let own = self.points.iter_mut().filter(|(_, group)| *group == number);
+                    own.for_each(|(_, group)| *group = -id); // not to be taken for another's
+                }
+                None => self.names.push((0, id, name)),
+            }
+        }
+        self.points.iter_mut().for_each(|(_, group)| *group = group.abs());
+    }
+
+    /// The groups of points, each of them in the first that has it, and the number of points left out.
+    fn point_groups(
+        &self,
+        point_count: usize,
+        taken: &mut HashSet<String>,
+    ) -> (Vec<PointGroup>, usize) {
+        let mut groups: BTreeMap<i32, Vec<u32>> = BTreeMap::new();
+        let (mut found, mut left_out) = (HashSet::new(), 0);
+        for &(point, id) in &self.points {
+            if (point as usize) < point_count && id > 0 && found.insert(point) {
+                groups.entry(id).or_default().push(point);
+            } else {
+                left_out += 1;
+            }
+        }
+        let named = |(id, points): (i32, Vec<u32>)| {
+            let name = self.name(0, id).unwrap_or_else(|| format!("points-{id}"));
+            PointGroup { id: id as u32, name: unique(name, taken), points }
+        };
+        (groups.into_iter().map(named).collect(), left_out)
+    }
+
+    /// The tags of a mesh of edges and triangles, or of triangles and tetrahedra; and the number of facets and points left
     /// out because they are not the mesh's, or are listed twice.
     pub fn into_tags<const D: usize>(
         self,
@@ -109,7 +158,9 @@ impl RawTags {
         let mut groups: Vec<FacetGroup<D>> = groups.into_values().collect();
         groups.sort_by_key(|group| group.id);
         groups.dedup_by_key(|group| group.id);
-        Ok((Tags::new(mesh, groups, regions)?, left_out))
+        let (points, others) = self.point_groups(mesh.points().len(), &mut taken);
+        let tags = Tags::new(mesh, groups, regions)?.with_point_groups(mesh, points)?;
+        Ok((tags, left_out + others))
     }
 
     fn name(&self, dimension: usize, id: i32) -> Option<String> {

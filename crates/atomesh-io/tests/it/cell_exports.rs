@@ -10,8 +10,8 @@ use atomesh::voronoi::voronoi;
 use atomesh::watch::Silent;
 use atomesh_io::atomic_file::AtomicFile;
 use atomesh_io::mesh::cells::{
-    AnyCells, CellData, CellReadError, ConnectionFiles, Flow, LoadedCells, ModflowFiles, Rock,
-    read_cells, write_connections, write_connections_with_flow, write_modflow,
+    AnyCells, CellData, CellReadError, ConnectionFiles, Flow, LoadedCells, ModflowFiles, NO_CELL,
+    Rock, read_cells, write_connections, write_connections_with_flow, write_modflow,
 };
 use atomesh_io::mesh::cells::{write_cells_vtu, write_cells_vtu_with};
 use atomesh_io::mesh::{CellFields, Provenance};
@@ -60,7 +60,8 @@ fn with_data<const D: usize>(
     let options = serde_json::json!({ "lattice": { "units": "physical" } });
     let provenance = Provenance { version: "0".into(), options, seed: 7, units: Vec::new() };
     let features = features(mesh);
-    use_it(&CellData { mesh, features: &features, frame, provenance: &provenance });
+    let wells = &[NO_CELL, 5];
+    use_it(&CellData { mesh, features: &features, frame, provenance: &provenance, wells });
 }
 
 fn write_vtu<const D: usize>(path: &Path, data: &CellData<D>) {
@@ -104,6 +105,8 @@ fn cells_are_read_back_as_they_were_written() {
     assert_eq!(read_flat(&vtu).mesh, mesh);
     same(&read_flat(&list), &mesh);
     for file in [&vtu, &list] {
+        assert_eq!(read_flat(file).wells, [NO_CELL, 5]);
+        assert_eq!(read_flat(file).fields, []);
         assert_eq!(read_flat(file).features.of_faces, features(&mesh).of_faces);
         assert_eq!(read_flat(file).frame, frame);
     }
@@ -115,6 +118,8 @@ fn cells_are_read_back_as_they_were_written() {
     assert_eq!(read_volume(&vtu).mesh, mesh);
     same(&read_volume(&list), &mesh);
     assert_eq!(read_volume(&vtu).features.of_faces, features(&mesh).of_faces);
+    // polyhedra stand in another order in the file
+    assert_eq!(read_volume(&vtu).wells, [NO_CELL, 5]);
 }
 
 /// Numbers of each cell, none of them alike.
@@ -386,6 +391,32 @@ fn a_layer_of_polygons_has_the_areas_of_the_cells_and_runs_clockwise() {
     assert_eq!(rows[1], ["1", &a, "1", &b, "-0.25"], "below 0: a multiplier");
 }
 
+/// In plan a polyhedron is convex, runs clockwise around its site, and holds all of its points.
+fn in_plan(disu: &str, mesh: &PolyMesh<3>) {
+    let number = |word: &&str| word.parse::<f64>().unwrap();
+    let points: Vec<[f64; 2]> =
+        block(disu, "VERTICES").iter().map(|row| [number(&row[1]), number(&row[2])]).collect();
+    assert_eq!(points.len(), mesh.points().len());
+    let rows = block(disu, "CELL2D");
+    assert_eq!(rows.len(), mesh.cell_count());
+    for (cell, row) in rows.iter().enumerate() {
+        let site = mesh.centers()[cell];
+        assert_eq!([number(&row[1]), number(&row[2])], [site[0], site[1]]);
+        let around: Vec<[f64; 2]> =
+            row[4..].iter().map(|word| points[word.parse::<usize>().unwrap() - 1]).collect();
+        assert_eq!(row[3], around.len().to_string());
+        let corners = mesh.faces_of(cell).flat_map(|(face, _)| mesh.face(face));
+        let inside = corners.map(|&c| [mesh.points()[c as usize][0], mesh.points()[c as usize][1]]);
+        for p in inside.chain([[site[0], site[1]]]) {
+            for (k, a) in around.iter().enumerate() {
+                let b = around[(k + 1) % around.len()];
+                let turn = (b[0] - a[0]) * (p[1] - a[1]) - (b[1] - a[1]) * (p[0] - a[0]);
+                assert!(turn < 1e-12, "cell {cell}: to the right of every side, or on it");
+            }
+        }
+    }
+}
+
 #[test]
 fn polyhedra_have_the_volumes_and_conductances_of_the_cells() {
     // cubic samples: the cells of a stretched frame would not stand at right angles
@@ -400,8 +431,13 @@ fn polyhedra_have_the_volumes_and_conductances_of_the_cells() {
     let nja = count + 2 * faces.len();
     assert_eq!(
         block(&disu, "DIMENSIONS"),
-        [["NODES", &count.to_string()], ["NJA", &nja.to_string()]]
+        [
+            ["NODES", &count.to_string()],
+            ["NJA", &nja.to_string()],
+            ["NVERT", &mesh.points().len().to_string()]
+        ]
     );
+    in_plan(&disu, &mesh);
     let of_cells = |name: &str| array(&disu, name, count);
     for cell in 0..count {
         let height = of_cells("TOP")[cell] - of_cells("BOT")[cell];
@@ -458,7 +494,7 @@ fn written_without_features(frame: &Frame<2>, mesh: &PolyMesh<2>, rock: &Rock) -
         units: Vec::new(),
     };
     let features = FeatureFaces::default();
-    let data = CellData { mesh, features: &features, frame, provenance: &provenance };
+    let data = CellData { mesh, features: &features, frame, provenance: &provenance, wells: &[1] };
     write_modflow(&files, &data, rock, &mut Silent).unwrap();
     let paths = files.paths();
     std::array::from_fn(|n| std::fs::read_to_string(paths[n]).unwrap())

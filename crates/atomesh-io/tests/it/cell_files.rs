@@ -12,8 +12,10 @@ use atomesh::voronoi::voronoi;
 use atomesh::watch::Silent;
 use atomesh_io::mesh::Provenance;
 use atomesh_io::mesh::cells::write_cells_vtu;
-use atomesh_io::mesh::cells::{CellData, ConnectionFiles, foam_mesh_of, write_connections};
-use atomesh_io::mesh::openfoam::{read_foam_mesh, write_foam_mesh};
+use atomesh_io::mesh::cells::{
+    CellData, ConnectionFiles, NO_CELL, foam_mesh_of, write_connections,
+};
+use atomesh_io::mesh::openfoam::{CellZone, read_foam_mesh, write_foam_mesh};
 
 /// A body-centred crystal in a box whose sides cut its cells.
 fn crystal() -> PolyMesh<3> {
@@ -49,7 +51,8 @@ fn with_data<const D: usize, T>(mesh: &PolyMesh<D>, use_it: impl FnOnce(&CellDat
     let options = serde_json::json!({});
     let provenance = Provenance { version: "0".into(), options, seed: 7, units: Vec::new() };
     let features = unmarked(mesh);
-    use_it(&CellData { mesh, features: &features, frame: &frame, provenance: &provenance })
+    let wells = &[3, NO_CELL, 7];
+    use_it(&CellData { mesh, features: &features, frame: &frame, provenance: &provenance, wells })
 }
 
 /// The arrays of a VTU file by name, as bytes, by what the format says and nothing of this crate.
@@ -172,6 +175,9 @@ fn open_foam_s_folder_reads_back_closed_with_sides_and_features() {
         assert_eq!(names[..4], ["xmin", "xmax", "ymin", "ymax"]);
         assert_eq!(read.face_zones()[0].name, "feature-1");
         assert_eq!(read.face_zones()[0].faces.len(), 1);
+        let wells = [("well-1", 3), ("well-3", 7)];
+        let wells = wells.map(|(name, cell)| CellZone { name: name.into(), cells: vec![cell] });
+        assert_eq!(read.cell_zones(), wells);
     }
 }
 
@@ -194,6 +200,9 @@ fn a_list_of_connections_says_what_the_mesh_is() {
     let number = |text: &String| text.parse::<f64>().unwrap();
     let total: f64 = cells.iter().map(|row| number(&row[3])).sum();
     assert!((total - 12.0).abs() < 1e-12);
+    let of_wells = cells.iter().enumerate().filter(|(_, row)| row[6] != "0");
+    let of_wells: Vec<_> = of_wells.map(|(cell, row)| (cell, row[6].as_str())).collect();
+    assert_eq!(of_wells, [(3, "1"), (7, "3")]);
     // each cell's outward area vectors cancel, by the tables alone
     let mut open = vec![[0.0; 2]; 40];
     for row in &inner {

@@ -135,8 +135,13 @@ fn heads_of_cells<const D: usize>(
         seed: 0,
         units: Vec::new(),
     };
-    let data =
-        CellData { mesh: &mesh, features: &features, frame: &frame, provenance: &provenance };
+    let data = CellData {
+        mesh: &mesh,
+        features: &features,
+        frame: &frame,
+        provenance: &provenance,
+        wells: &[],
+    };
     let (pressures, velocities) = (vec![1.0; sites.len()], vec![[2.0; D]; sites.len()]);
     let fields = CellFields::new(sites.len()).with_numbers("pressure", &pressures).unwrap();
     let fields = fields.with_vectors("velocity", &velocities).unwrap();

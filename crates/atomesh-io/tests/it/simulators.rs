@@ -42,7 +42,8 @@ fn texts<const D: usize>(
     let provenance =
         Provenance { version: "0".into(), options: serde_json::json!({}), seed: 7, units: vec![] };
     let features = FeatureFaces { of_faces: vec![], strengths: vec![], areas: vec![] };
-    let data = CellData { mesh, features: &features, frame, provenance: &provenance };
+    let wells = &[2];
+    let data = CellData { mesh, features: &features, frame, provenance: &provenance, wells };
     write_simulator(&files, &data, rock, &mut Silent).unwrap();
     files.paths().iter().map(|path| std::fs::read_to_string(path).unwrap()).collect()
 }
@@ -96,9 +97,11 @@ fn check_pflotran<const D: usize>(frame: &Frame<D>, delaunay: &Delaunay<D>, thic
         assert!((row[5] / way - conductance).abs() < 1e-10 * conductance, "{a} {b}");
     }
     // the faces of a side have its area, and places off the centres
-    assert_eq!(texts.len(), 1 + 2 * D);
+    assert_eq!(texts.len(), 2 + 2 * D);
+    let site: Vec<String> = mesh.centers()[2].iter().map(|x| format!(",{x:?}")).collect();
+    assert!(texts[1 + 2 * D].ends_with(&format!("\nwell-1,3{}\n", site.concat())));
     let extent = frame.grid(atomesh::image::Units::Physical).bounds().extent();
-    for (side, text) in texts[1..].iter().enumerate() {
+    for (side, text) in texts[1..=2 * D].iter().enumerate() {
         let rows: Vec<Vec<f64>> = text.lines().skip(1).map(numbers).collect();
         assert_eq!(text.lines().next(), Some(&*format!("CONNECTIONS {}", rows.len())));
         let area: f64 = rows.iter().map(|row| row[4]).sum();

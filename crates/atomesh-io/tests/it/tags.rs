@@ -1,11 +1,14 @@
 //! Tags go through every format that holds them, and stay as they were.
 
 use atomesh::geometry::Bounds;
-use atomesh::mesh::{Delaunay, FacetGroup, Mesh, Regions, Tags, interface_name};
+use atomesh::mesh::{
+    Delaunay, FacetGroup, Mesh, PointGroup, Quadratic, Regions, Tags, interface_name,
+};
 use atomesh::region::{Interface, interfaces};
 use atomesh::watch::Silent;
 use atomesh_io::mesh::inp::read_inp;
 use atomesh_io::mesh::msh::{MshEncoding, MshVersion, read_msh};
+use atomesh_io::mesh::openfoam::{FoamMesh, read_foam_mesh, write_foam_mesh};
 use atomesh_io::mesh::vtu::read_vtu;
 use atomesh_io::mesh::{
     AnyMesh, LoadedMesh, MeshData, MeshFormat, Provenance, read_mesh, write_mesh_as,
@@ -42,7 +45,18 @@ fn tagged<const D: usize>(mesh: &Mesh<D>, regions: Option<Regions>) -> Tags<D> {
         FacetGroup { id: 20, name: "inlet".into(), facets: shared },
         FacetGroup { id: 11, name: "feature-1".into(), facets: turned.collect() },
     ];
-    sides.merge(Tags::new(mesh, groups, regions).unwrap()).unwrap()
+    let tags = sides.merge(Tags::new(mesh, groups, regions).unwrap()).unwrap();
+    tags.with_point_groups(mesh, wells(mesh)).unwrap()
+}
+
+/// A point inside, and two corners in one group.
+fn wells<const D: usize>(mesh: &Mesh<D>) -> Vec<PointGroup> {
+    let inside = mesh.points().iter().position(|p| p[0].fract() != 0.0).unwrap();
+    let last = mesh.points().len() as u32 - 1;
+    vec![
+        PointGroup { id: 1, name: "well-1".into(), points: vec![inside as u32] },
+        PointGroup { id: 4, name: "corners".into(), points: vec![0, last] },
+    ]
 }
 
 fn regions(cells: usize, names: &[(i32, &str)]) -> Regions {
@@ -101,6 +115,8 @@ fn check<const D: usize>(
         assert_eq!(read.skipped_cells, 0, "{name}");
         assert_eq!(read.provenance.as_ref(), Some(&provenance), "{name}");
         assert_eq!(read.tags.regions(), tags.regions(), "{name}");
+        assert_eq!(read.tags.point_groups(), tags.point_groups(), "{name}");
+        assert_eq!(read.point_fields, [], "{name}");
         let (found, expected) = (canonical(&read.tags), canonical(tags));
         assert_eq!(found, expected, "{name}");
     }
@@ -275,4 +291,55 @@ proptest! {
         }
         read_bytes(FORMATS[format].1, &bytes);
     }
+}
+
+/// Of formats without facets and regions, points have their groups all the same.
+#[test]
+fn groups_of_points_go_through_every_format() {
+    fn check<const D: usize>(pick: fn(AnyMesh) -> Option<LoadedMesh<D>>, mesh: &Mesh<D>) {
+        let folder = tempfile::tempdir().unwrap();
+        let tags = Tags::default().with_point_groups(mesh, wells(mesh)).unwrap();
+        let quadratic = Quadratic::new(mesh);
+        let plain = MeshData::new(mesh).with_tags(&tags);
+        let straight = [("a.vtk", MeshFormat::Vtk), ("a.npz", MeshFormat::Npz)];
+        for (name, format) in straight.into_iter().chain(FORMATS) {
+            // of cells of second order too, whose corners alone are read back
+            for data in [plain.clone(), plain.clone().with_quadratic(&quadratic)] {
+                let path = folder.path().join(name);
+                write_mesh_as(&path, format, &data, &mut Silent).unwrap();
+                let read = pick(read_mesh(&path).unwrap()).unwrap();
+                assert_eq!(read.tags.point_groups(), tags.point_groups(), "{name}");
+                assert_eq!((read.skipped_cells, read.point_fields.len()), (0, 0), "{name}");
+            }
+        }
+        let foam = FoamMesh::of_mesh(&plain).unwrap();
+        let path = folder.path().join("polyMesh");
+        write_foam_mesh(&path, &foam, &mut Silent).unwrap();
+        let zones = read_foam_mesh(&path).unwrap().point_zones().to_vec();
+        let names: Vec<&str> = zones.iter().map(|zone| zone.name.as_str()).collect();
+        assert_eq!(names, ["well-1", "corners"]);
+        // flat meshes have two points of each
+        assert_eq!(zones[0].points.len(), if D == 2 { 2 } else { 1 });
+    }
+    check(flat, &Delaunay::<2>::new().connect(&points(4), &mut Silent).unwrap());
+    check(volume, &Delaunay::<3>::new().connect(&points(3), &mut Silent).unwrap());
+}
+
+/// Gmsh's own files have points in groups, one point in two of them, and groups whose numbers lines have too.
+#[test]
+fn physical_points_of_gmsh_are_groups_of_points() {
+    let text = "$MeshFormat\n2.2 0 8\n$EndMeshFormat\n\
+        $PhysicalNames\n2\n0 1 \"tip\"\n1 1 \"rim\"\n$EndPhysicalNames\n\
+        $Nodes\n4\n1 0 0 0\n2 1 0 0\n3 0 1 0\n4 1 1 0\n$EndNodes\n\
+        $Elements\n6\n1 15 2 1 1 2\n2 15 2 5 1 2\n3 15 2 5 2 3\n4 1 2 1 1 1 2\n\
+        5 2 2 0 1 1 2 3\n6 2 2 0 1 2 4 3\n$EndElements\n";
+    let AnyMesh::Flat(read) = read_msh(text.as_bytes()).unwrap() else { panic!("triangles") };
+    let group = |id, name: &str, points: &[u32]| PointGroup {
+        id,
+        name: name.into(),
+        points: points.to_vec(),
+    };
+    assert_eq!(read.tags.point_groups(), [group(1, "tip", &[1]), group(5, "points-5", &[2])]);
+    assert_eq!(read.tags.facet_groups()[0].name, "rim");
+    assert_eq!(read.skipped_cells, 1, "the point that is in a group before");
 }

@@ -246,8 +246,8 @@ impl<const D: usize> Writing<'_, D> {
     }
 
     fn write_cells(&self, path: &Path, session: &mut Session<'_>) -> Result<(), JobError> {
-        let LoadedCells { mesh, fields, frame, provenance, .. } = self.loaded;
-        let data = CellData { mesh, features: &self.found.faces, frame, provenance };
+        let LoadedCells { mesh, fields, .. } = self.loaded;
+        let data = CellData { features: &self.found.faces, ..self.loaded.data() };
         let mut all = CellFields::new(mesh.cell_count());
         for field in fields {
             all = all.with_numbers(&field.name, &field.values).map_err(JobError::content)?;

@@ -14,7 +14,7 @@ use super::options::FlowOptions;
 use super::problem::place;
 use crate::error::JobError;
 use crate::images::is_z_up;
-use crate::mesh::{meshed, refusal};
+use crate::mesh::{cells_of_wells, meshed, refusal};
 use crate::mesh_file::{self, MeshFile};
 use crate::options::RunConfig;
 use crate::session::Session;
@@ -35,6 +35,8 @@ pub enum FlowMeshCells<const D: usize> {
         cells: Box<PolyMesh<D>>,
         /// Their faces on features.
         features: FeatureFaces,
+        /// The cell of each well, in their order; [`atomesh_io::mesh::cells::NO_CELL`] for one that no cell has.
+        wells: Vec<u32>,
     },
 }
 
@@ -81,9 +83,9 @@ pub(super) fn read(path: &Path, session: &mut Session<'_>) -> Result<AnyFlowMesh
 impl<const D: usize> FlowMesh<D> {
     /// Voronoi cells as read.
     pub fn of_cells(loaded: LoadedCells<D>) -> Self {
-        let LoadedCells { mesh, features, fields, frame, provenance, .. } = loaded;
+        let LoadedCells { mesh, features, fields, frame, provenance, wells, .. } = loaded;
         Self {
-            cells: FlowMeshCells::Voronoi { cells: Box::new(mesh), features },
+            cells: FlowMeshCells::Voronoi { cells: Box::new(mesh), features, wells },
             cell_fields: fields,
             frame: Some(frame),
             image: None,
@@ -139,7 +141,8 @@ impl<const D: usize> FlowMesh<D> {
         let cells = match outcome.world_cells() {
             Some(cells) => {
                 let features = outcome.cell_features_from(-flow.below).unwrap_or_default();
-                FlowMeshCells::Voronoi { cells: Box::new(cells), features }
+                let wells = cells_of_wells(&outcome);
+                FlowMeshCells::Voronoi { cells: Box::new(cells), features, wells }
             }
             None => {
                 let mesh = outcome.world_mesh();
@@ -163,7 +166,7 @@ impl<const D: usize> FlowMesh<D> {
     /// Cells and facets, as the schemes take them.
     pub fn grid(&self, method: &FlowMethod<D>) -> FlowGrid<D> {
         match &self.cells {
-            FlowMeshCells::Voronoi { cells, features } => {
+            FlowMeshCells::Voronoi { cells, features, .. } => {
                 (method.grid_of_cells)(cells, Some(features))
             }
             FlowMeshCells::Simplices { mesh, tags } => (method.grid_of_mesh)(mesh, tags),

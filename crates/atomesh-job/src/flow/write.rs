@@ -113,12 +113,12 @@ impl<'a, const D: usize> FlowWriting<'a, D> {
                 let format = MeshFormat::of(path).map_err(JobError::misuse)?;
                 (files.mesh)(path, format, &data, session)
             }
-            FlowMeshCells::Voronoi { cells, features } => {
+            FlowMeshCells::Voronoi { cells, features, wells } => {
                 let (Some(frame), Some(provenance)) = (&mesh.frame, &mesh.provenance) else {
                     let message = "Voronoi cells without a frame cannot be written";
                     return Err(JobError::content(message));
                 };
-                let data = CellData { mesh: &**cells, features, frame, provenance };
+                let data = CellData { mesh: &**cells, features, frame, provenance, wells };
                 let fields = fields.of_voronoi(cells.cell_count()).map_err(JobError::content)?;
                 (files.cells_with)(path, &data, &fields, session)
             }

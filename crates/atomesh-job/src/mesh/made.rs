@@ -8,7 +8,7 @@ use atomesh_io::mesh::{LoadedMesh, OwnedField};
 use super::MeshSummary;
 use super::figures::{Figures, Measured, RunPage};
 use super::outputs::Outputs;
-use super::write::Writing;
+use super::write::{Writing, cells_of_wells};
 use crate::dimension::Dimension;
 use crate::error::JobError;
 use crate::files::write_bytes;
@@ -68,6 +68,7 @@ impl<const D: usize> MadeMesh<'_, D> {
             skipped_fields: Vec::new(),
             frame: *outcome.frame(),
             provenance: self.run.provenance::<D>().in_units(self.units),
+            wells: cells_of_wells(outcome),
         })
     }
 

@@ -20,6 +20,7 @@ pub use made::MadeMesh;
 pub(crate) use outputs::staged_list;
 pub use refusal::refusal;
 pub use write::Tagged;
+pub(crate) use write::cells_of_wells;
 
 use std::path::{Path, PathBuf};
 

@@ -9,7 +9,7 @@ use atomesh::mesh::{Mesh, Regions, Tags};
 use atomesh::run::Outcome;
 use atomesh::watch::Phase;
 use atomesh_draw::Style;
-use atomesh_io::mesh::cells::CellData;
+use atomesh_io::mesh::cells::{CellData, NO_CELL};
 use atomesh_io::mesh::{MeshData, MeshFormat, Provenance, Sections};
 
 use super::format::OutputFormat;
@@ -188,7 +188,8 @@ impl<const D: usize> Writing<'_, D> {
         let is_foam = outputs.format == OutputFormat::VoronoiFoam;
         let features = self.outcome.cell_features().unwrap_or_default();
         let frame = self.outcome.frame();
-        let data = CellData { mesh: &mesh, features: &features, frame, provenance };
+        let wells = cells_of_wells(self.outcome);
+        let data = CellData { mesh: &mesh, features: &features, frame, provenance, wells: &wells };
         let files = &self.dimension.files;
         let written = match self.properties {
             [] if is_foam => (files.foam_cells)(path, &data, session),
@@ -209,6 +210,11 @@ impl<const D: usize> Writing<'_, D> {
         }
         Ok(())
     }
+}
+
+/// The Voronoi cell of each seed point.
+pub(crate) fn cells_of_wells<const D: usize>(outcome: &Outcome<D>) -> Vec<u32> {
+    outcome.wells().into_iter().map(|cell| cell.unwrap_or(NO_CELL)).collect()
 }
 
 /// Refuses sections of another dimension, and says which materials fill no region.

@@ -6,7 +6,7 @@ use atomesh::image::{Frame, Image};
 use atomesh::run::Tools;
 use atomesh::sample::{CellProperties, SampleError, SampleOptions};
 use atomesh::watch::Watch;
-use atomesh_io::mesh::cells::{CellData, LoadedCells};
+use atomesh_io::mesh::cells::LoadedCells;
 use atomesh_io::mesh::{
     CellFields, LoadedMesh, MeshData, MeshDataError, MeshFormat, OwnedField, Provenance,
 };
@@ -160,9 +160,8 @@ impl<const D: usize> SampledMesh<D> for LoadedCells<D> {
         dimension: &Dimension<D>,
         session: &mut Session<'_>,
     ) -> Result<(), JobError> {
-        let Self { mesh, features, frame, provenance, .. } = self;
-        let data = CellData { mesh, features, frame, provenance };
-        let fields = cell_fields(mesh.cell_count(), properties).map_err(JobError::content)?;
+        let data = self.data();
+        let fields = cell_fields(self.mesh.cell_count(), properties).map_err(JobError::content)?;
         let written = (dimension.files.cells_with)(path, &data, &fields, session);
         written.map_err(|e| JobError::from(e).about(path))
     }

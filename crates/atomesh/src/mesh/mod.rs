@@ -27,8 +27,8 @@ pub use poly_mesh::{
 pub use quadratic::Quadratic;
 use rayon::prelude::*;
 pub use tags::{
-    FacetGroup, MASK_NAME, Regions, Tags, TagsError, feature_name, interface_name, is_feature_name,
-    region_name, side_name,
+    FacetGroup, MASK_NAME, PointGroup, Regions, Tags, TagsError, feature_name, interface_name,
+    is_feature_name, region_name, side_name, well_name,
 };
 pub use validate::MeshFault;
 

@@ -57,6 +57,7 @@ pub(super) struct Stages<const D: usize> {
     pub cell_features: fn(&Outcome<D>, f64) -> Option<FeatureFaces>,
     pub across_features: fn(&Outcome<D>, &mut dyn Watch) -> Made<Vec<AcrossFeature<D>>>,
     pub feature_density: fn(&Outcome<D>) -> Vec<f32>,
+    pub wells: fn(&Outcome<D>) -> Vec<Option<u32>>,
     pub tags: fn(&Outcome<D>) -> Result<Tags<D>, TagsError>,
     pub quadratic: fn(&Outcome<D>) -> Quadratic<D>,
 }
@@ -84,6 +85,7 @@ impl<const D: usize> Stages<D> {
             cell_features: outcome::cell_features_of,
             across_features: across::across_features,
             feature_density: outcome::feature_density_of,
+            wells: outcome::wells_of,
             tags: outcome::tags_of,
             quadratic: outcome::quadratic_of,
         }

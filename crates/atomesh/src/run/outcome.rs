@@ -1,5 +1,7 @@
 //! What a run gives.
 
+use std::collections::HashSet;
+
 use rayon::prelude::*;
 
 use crate::conform::FeatureFacet;
@@ -13,7 +15,8 @@ use crate::image::{Frame, Grid, Samples, Units};
 use crate::improve::ImproveReport;
 use crate::measure::FidelityReport;
 use crate::mesh::{
-    FacetGroup, MASK_NAME, Mesh, PolyMesh, Quadratic, Regions, Tags, TagsError, interface_name,
+    FacetGroup, MASK_NAME, Mesh, PointGroup, PolyMesh, Quadratic, Regions, Tags, TagsError,
+    interface_name, well_name,
 };
 use crate::mirror::MirrorReport;
 use crate::optimize::OptimizeReport;
@@ -23,7 +26,7 @@ use crate::watch::Watch;
 use super::across::AcrossFeature;
 use super::compiled::Stages;
 use super::error::{RunError, Warning};
-use super::prepared::Prepared;
+use super::prepared::{Prepared, seed_points};
 use super::report::{MeshReport, VoronoiReport};
 
 /// A mesh, the fields it follows, and how it came about.
@@ -84,6 +87,12 @@ impl<const D: usize> Outcome<D> {
         watch: &mut dyn Watch,
     ) -> Result<FeatureSet<D>, RunError> {
         (self.stages().features)(self, world, options, watch)
+    }
+
+    /// The place among the mesh's points, or the Voronoi cells if they were asked for, of each point that was to stay
+    /// where it is ([`MeshOptions::seed_points`](super::MeshOptions::seed_points)); `None` where a mask left it out.
+    pub fn wells(&self) -> Vec<Option<u32>> {
+        (self.stages().wells)(self)
     }
 
     /// The Voronoi cells around the mesh's points, in lattice coordinates, if they were asked for.
@@ -213,7 +222,8 @@ impl<const D: usize> Outcome<D> {
 
     /// The tags of [`Outcome::world_mesh`]: the box's sides `xmin` … `zmax`; with a mask, `mask`, its outline;
     /// with labels, regions of the same numbers, and for each two that meet their facets, as
-    /// `interface-2-5`.
+    /// `interface-2-5`; of points that were to stay where they are, `well-1`, `well-2` … in the order in which they were
+    /// given.
     ///
     /// # Errors
     /// [`TagsError`] if there are too many interfaces to number.
@@ -359,6 +369,24 @@ pub(super) fn feature_density_of<const D: usize>(outcome: &Outcome<D>) -> Vec<f3
         .expect("a potential has a sample for each of its grid, and d is a length")
 }
 
+/// [`Outcome::wells`].
+pub(super) fn wells_of<const D: usize>(outcome: &Outcome<D>) -> Vec<Option<u32>> {
+    let points = outcome.cells.as_ref().map_or(outcome.mesh.points(), |cells| cells.centers());
+    let place = |well: &Point<D>| points.iter().position(|p| p == well).map(|place| place as u32);
+    seed_points(&outcome.run).iter().map(place).collect()
+}
+
+/// The wells that are points of the mesh, of those at one place the first.
+fn well_groups<const D: usize>(outcome: &Outcome<D>) -> Vec<PointGroup> {
+    let mut taken = HashSet::new();
+    let wells = wells_of(outcome).into_iter().zip(1..);
+    let wells = wells.filter_map(|(point, number)| Some((point?, number)));
+    wells
+        .filter(|(point, _)| taken.insert(*point))
+        .map(|(point, id)| PointGroup { id, name: well_name(id), points: vec![point] })
+        .collect()
+}
+
 /// [`Outcome::tags`].
 pub(super) fn tags_of<const D: usize>(outcome: &Outcome<D>) -> Result<Tags<D>, TagsError> {
     let sides = sides(&outcome.mesh, &outcome.run.bounds(), false);
@@ -382,6 +410,9 @@ pub(super) fn tags_of<const D: usize>(outcome: &Outcome<D>) -> Result<Tags<D>, T
     let mut tags = Tags::new(&outcome.mesh, groups, regions)?;
     if let Some(features) = own_features(outcome, &outcome.mesh) {
         tags = tags.merge(features.tags(&outcome.mesh)?)?;
+    }
+    if outcome.cells.is_none() {
+        tags = tags.with_point_groups(&outcome.mesh, well_groups(outcome))?;
     }
     Ok(if outcome.frame().is_mirrored() { tags.turned() } else { tags })
 }

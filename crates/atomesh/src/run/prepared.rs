@@ -308,7 +308,7 @@ pub(super) fn fill<const D: usize>(
     run: &Prepared<D>,
     watch: &mut dyn Watch,
 ) -> Result<Filled<D>, RunError> {
-    let Parts { method, options, frame, outline, .. } = run.parts();
+    let Parts { method, options, outline, .. } = run.parts();
     let distance = run.distance();
     let estimate = run.estimate();
     if let Some(available) = options.memory_limit
@@ -318,7 +318,7 @@ pub(super) fn fill<const D: usize>(
         return Err(RunError::Memory { needed: estimate.memory, available, least });
     }
     let bounds = run.bounds();
-    let seed_points = options.seed_points.iter().map(|p| in_lattice(run, frame, p)).collect();
+    let seed_points = seed_points(run);
     let lattice = match method.crystal(options.lattice)? {
         Some(crystal) => {
             let spacing_factor = options.spacing_factor;
@@ -333,6 +333,12 @@ pub(super) fn fill<const D: usize>(
     };
     let order = compact_order(lattice.atoms());
     Ok(Filled::new(run.clone(), lattice.reordered(&order)))
+}
+
+/// The points that are to stay where they are, in lattice coordinates.
+pub(super) fn seed_points<const D: usize>(run: &Prepared<D>) -> Vec<Point<D>> {
+    let frame = &run.parts().frame;
+    run.options().seed_points.iter().map(|p| in_lattice(run, frame, p)).collect()
 }
 
 /// A seed point from world to lattice. One that was meant to be on a side may come back a rounding from it, within or

@@ -445,6 +445,14 @@ fn seed_points_of_the_world_are_points_of_the_mesh() {
                 let near = |p: &Point<2>| crate::geometry::distance_squared(p, &seed) < 1e-20;
                 assert!(mesh.points().iter().any(near), "{units:?} {lattice:?} {seed:?}");
             }
+            // and are tagged, in the order given
+            let tags = outcome.tags().unwrap();
+            let names = tags.point_groups().iter().map(|group| group.name.as_str());
+            assert_eq!(names.collect::<Vec<_>>(), ["well-1", "well-2"]);
+            for (group, seed) in tags.point_groups().iter().zip(&seeds) {
+                let p = outcome.world_mesh().points()[group.points[0] as usize];
+                assert!(crate::geometry::distance_squared(&p, seed) < 1e-20, "{}", group.name);
+            }
         }
     }
 }

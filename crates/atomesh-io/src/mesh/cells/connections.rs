@@ -9,7 +9,7 @@ use atomesh::watch::{Phase, Watch, check};
 use serde_json::json;
 
 use super::super::error::MeshWriteError;
-use super::CellData;
+use super::{CellData, WELL};
 use crate::atomic_file::AtomicFile;
 
 /// Where a list of connections goes: a head, and three tables beside it.
@@ -127,7 +127,11 @@ fn column<const D: usize>(list: &List<D>, name: &str) -> String {
 
 fn cells<const D: usize>(list: &List<D>) -> String {
     let mesh = list.data.mesh;
-    let more = column(list, "permeability");
+    let mut more = column(list, "permeability");
+    let wells = list.data.well_of_cells();
+    if !wells.is_empty() {
+        let _ = write!(more, ",{WELL}");
+    }
     let mut text = format!("cell,{},volume,{}{more}\n", vector::<D>("site"), vector::<D>("center"));
     for cell in 0..mesh.cell_count() {
         let _ = write!(text, "{cell}");
@@ -135,6 +139,9 @@ fn cells<const D: usize>(list: &List<D>) -> String {
         put(&mut text, &[mesh.measures()[cell]]);
         put(&mut text, &mesh.centroids()[cell]);
         put(&mut text, list.flow.map_or(&[], |flow| &flow.permeability[cell..=cell]));
+        if let Some(well) = wells.get(cell) {
+            let _ = write!(text, ",{well}");
+        }
         text.push('\n');
     }
     text
@@ -222,6 +229,9 @@ fn head<const D: usize>(list: &List<D>) -> String {
         "features": features,
         "metadata": metadata,
     });
+    if !data.wells.is_empty() {
+        text["columns"][WELL] = "the number of the well in the cell, from 1 on; 0 for none".into();
+    }
     if list.flow.is_some() {
         text["columns"]["permeability"] = "k of the cell".into();
         text["columns"]["transmissibility"] = "what flows for a unit of pressure: multiplier · area / (distance_i/k_i + distance_j/k_j), k · area / distance to a side; nothing where a site lies on the side, whose pressure is then the cell's".into();

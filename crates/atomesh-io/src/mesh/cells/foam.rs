@@ -1,13 +1,13 @@
 //! Polygons and polyhedra as OpenFOAM's polyMesh.
 
-use atomesh::mesh::{feature_name, side_name};
+use atomesh::mesh::{feature_name, side_name, well_name};
 
-use super::super::openfoam::{Beyond, FaceZone, FoamMesh, FoamMeshError, Patch};
-use super::CellData;
+use super::super::openfoam::{Beyond, CellZone, FaceZone, FoamMesh, FoamMeshError, Patch};
+use super::{CellData, NO_CELL};
 
 impl FoamMesh {
-    /// Cells with the sides of the box as patches, xmin, xmax, ymin ..., and their features as the face zones
-    /// `feature-1`, `feature-2` ... Polygons become prisms as high as the square root of their mean area.
+    /// Cells with the sides of the box as patches, xmin, xmax, ymin ..., their features as the face zones
+    /// `feature-1`, `feature-2` ... and those of wells as the cell zones `well-1` ... Polygons become prisms as high as the square root of their mean area.
     ///
     /// # Errors
     /// [`FoamMeshError`] never, for a mesh that keeps its promises.
@@ -44,12 +44,17 @@ impl FoamMesh {
             let faces = of_faces.filter(|(_, f)| **f == feature).map(|(at, _)| (at as u32, false));
             made.push_face_zone(FaceZone { name: feature_name(feature), faces: faces.collect() })?;
         }
+        for (&cell, number) in data.wells.iter().zip(1..) {
+            if cell != NO_CELL {
+                made.push_cell_zone(CellZone { name: well_name(number), cells: vec![cell] })?;
+            }
+        }
         Ok(made.with_note(&format!("{} {}", super::super::metadata::NAME, data.metadata())))
     }
 }
 
 /// Cells as a polyMesh: the sides of the box as patches xmin, xmax, ymin ..., features as the face zones
-/// `feature-1`, `feature-2` ... Polygons become prisms as high as the square root of their mean area.
+/// `feature-1`, `feature-2` ..., cells of wells as the cell zones `well-1` ... Polygons become prisms as high as the square root of their mean area.
 ///
 /// # Errors
 /// [`FoamMeshError`] only if the mesh does not keep what it promises.

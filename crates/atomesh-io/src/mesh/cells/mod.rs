@@ -23,14 +23,16 @@ pub use read::{AnyCells, LoadedCells, read_cells};
 pub use simulators::{MOST_TOUGH_ELEMENTS, Simulator, SimulatorFiles, write_simulator};
 pub use vtu::{write_cells_vtu, write_cells_vtu_with};
 
+use std::fmt::Write as _;
 use std::io::Write;
-use std::path::PathBuf;
+use std::path::{Path, PathBuf};
 
 use atomesh::features::FeatureFaces;
 use atomesh::image::Frame;
-use atomesh::mesh::PolyMesh;
+use atomesh::mesh::{PolyMesh, well_name};
 use atomesh::watch::{Phase, Watch, check};
 
+use self::connections::{put, table_beside, vector};
 use super::error::MeshWriteError;
 use super::provenance::Provenance;
 use crate::atomic_file::AtomicFile;
@@ -46,13 +48,56 @@ pub struct CellData<'a, const D: usize> {
     pub frame: &'a Frame<D>,
     /// Where it comes from.
     pub provenance: &'a Provenance,
+    /// The cell of each well, in their order; [`NO_CELL`] for one that no cell has.
+    pub wells: &'a [u32],
 }
 
+/// In place of the cell of a well that has none.
+pub const NO_CELL: u32 = u32::MAX;
+
+/// The array, and the column of tables, of the number of the well in each cell, from 1 on; 0 for none.
+const WELL: &str = "well";
+
 impl<const D: usize> CellData<'_, D> {
+    /// The number of the well in each cell, from 1 on; empty if there are no wells.
+    fn well_of_cells(&self) -> Vec<u32> {
+        if self.wells.is_empty() {
+            return Vec::new();
+        }
+        let mut wells = vec![0; self.mesh.cell_count()];
+        for (number, &cell) in self.wells.iter().enumerate().rev() {
+            if let Some(well) = wells.get_mut(cell as usize) {
+                *well = number as u32 + 1;
+            }
+        }
+        wells
+    }
+
     /// Frame and provenance as JSON, the text that all mesh files carry.
     pub(super) fn metadata(&self) -> String {
         super::metadata::encode(Some(self.frame), Some(self.provenance))
     }
+}
+
+/// The table NAME-wells.csv beside a grid, for formats that have no room for wells.
+fn wells_beside(grid: &Path) -> PathBuf {
+    table_beside(grid, "wells")
+}
+
+/// The wells that cells have: name, cell, as the grid's format calls it, and place; nothing where there are none.
+fn wells_table<const D: usize>(
+    data: &CellData<D>,
+    name_of: impl Fn(usize) -> String,
+) -> Option<String> {
+    let known = || data.wells.iter().zip(1..).filter(|(cell, _)| **cell != NO_CELL);
+    known().next()?;
+    let mut text = format!("well,cell,{}\n", vector::<D>("site"));
+    for (&cell, number) in known() {
+        let _ = write!(text, "{},{}", well_name(number), name_of(cell as usize));
+        put(&mut text, &data.mesh.centers()[cell as usize]);
+        text.push('\n');
+    }
+    Some(text)
 }
 
 /// Writes texts to files. All appear only when all are written.

@@ -5,7 +5,8 @@
 //! are DISU. MODFLOW knows prisms only: between two cells it takes a width times the lesser of their heights.
 //! So every polyhedron is written with a height of 1 and the area that makes its volume, all connections lie
 //! flat (`ihc` 1) and are as wide as the face is large. Conductances and volumes are then those of the cells; tops and
-//! bottoms are not, so the files are for confined flow (`icelltype` 0).
+//! bottoms are not, so the files are for confined flow (`icelltype` 0). In plan (CELL2D) a polyhedron is its outline as
+//! seen from above, around its site: pictures and paths of particles take it from there.
 
 use std::fmt::Write as _;
 use std::path::{Path, PathBuf};
@@ -14,7 +15,7 @@ use atomesh::mesh::{Connection, PolyMesh, connections};
 use atomesh::watch::Watch;
 
 use super::super::error::MeshWriteError;
-use super::{CellData, write_texts};
+use super::{CellData, wells_beside, wells_table, write_texts};
 
 /// MODFLOW reads lines of any length; people do not.
 const NUMBERS_A_LINE: usize = 8;
@@ -28,6 +29,8 @@ pub struct ModflowFiles {
     pub npf: PathBuf,
     /// Barriers: NAME.hfb, where there are any.
     pub hfb: Option<PathBuf>,
+    /// The cells of wells: NAME-wells.csv, written where there are any.
+    pub wells: Option<PathBuf>,
 }
 
 impl ModflowFiles {
@@ -37,13 +40,14 @@ impl ModflowFiles {
             grid: grid.into(),
             npf: grid.with_extension("npf"),
             hfb: has_barriers.then(|| grid.with_extension("hfb")),
+            wells: Some(wells_beside(grid)),
         }
     }
 
     /// All of them.
     pub fn paths(&self) -> Vec<&Path> {
-        let three = [Some(&self.grid), Some(&self.npf), self.hfb.as_ref()];
-        three.into_iter().flatten().map(PathBuf::as_path).collect()
+        let all = [Some(&self.grid), Some(&self.npf), self.hfb.as_ref(), self.wells.as_ref()];
+        all.into_iter().flatten().map(PathBuf::as_path).collect()
     }
 }
 
@@ -76,6 +80,8 @@ pub fn write_modflow<const D: usize>(
     if let Some(path) = &files.hfb {
         texts.push((path, hfb(&faces, rock, D)));
     }
+    let wells = wells_table(data, |cell| (cell + 1).to_string());
+    texts.extend(files.wells.as_ref().zip(wells));
     write_texts(&texts, watch)
 }
 
@@ -113,22 +119,31 @@ fn disv<const D: usize>(mesh: &PolyMesh<D>, rock: &Rock) -> String {
     array(&mut lines, "BOTM", &vec![rock.top - rock.thickness; cells]);
     array(&mut lines, "IDOMAIN", &vec![1; cells]);
     block(&mut text, "GRIDDATA", &lines);
-    lines.clear();
+    plan(&mut text, mesh, clockwise);
+    text
+}
+
+/// Appends the points and each cell in the plane, by its site and the points around it.
+fn plan<const D: usize>(
+    text: &mut String,
+    mesh: &PolyMesh<D>,
+    around: fn(&PolyMesh<D>, usize) -> Vec<u32>,
+) {
+    let mut lines = String::new();
     for (number, point) in mesh.points().iter().enumerate() {
         let _ = writeln!(lines, "  {} {:?} {:?}", number + 1, point[0], point[1]);
     }
-    block(&mut text, "VERTICES", &lines);
+    block(text, "VERTICES", &lines);
     lines.clear();
     for (cell, site) in mesh.centers().iter().enumerate() {
-        let around = clockwise(mesh, cell);
+        let around = around(mesh, cell);
         let _ = write!(lines, "  {} {:?} {:?} {}", cell + 1, site[0], site[1], around.len());
         for corner in around {
             let _ = write!(lines, " {}", corner + 1);
         }
         lines.push('\n');
     }
-    block(&mut text, "CELL2D", &lines);
-    text
+    block(text, "CELL2D", &lines);
 }
 
 /// A cell's points, clockwise with y up, as MODFLOW asks.
@@ -172,7 +187,8 @@ fn disu<const D: usize>(mesh: &PolyMesh<D>, faces: &[Connection<D>]) -> String {
     let mut text = "# Voronoi cells, each with a height of 1 and the area that makes its volume; \
                     written by atomesh\n"
         .to_string();
-    block(&mut text, "DIMENSIONS", &format!("  NODES {cells}\n  NJA {}\n", ja.len()));
+    let (links, points) = (ja.len(), mesh.points().len());
+    block(&mut text, "DIMENSIONS", &format!("  NODES {cells}\n  NJA {links}\n  NVERT {points}\n"));
     let mut lines = String::new();
     let height = |site: &[f64; D], by: f64| site[D - 1] + by;
     array(&mut lines, "TOP", &mesh.centers().iter().map(|s| height(s, 0.5)).collect::<Vec<_>>());
@@ -186,7 +202,43 @@ fn disu<const D: usize>(mesh: &PolyMesh<D>, faces: &[Connection<D>]) -> String {
     array(&mut lines, "CL12", &cl12);
     array(&mut lines, "HWVA", &hwva);
     block(&mut text, "CONNECTIONDATA", &lines);
+    plan(&mut text, mesh, outline);
     text
+}
+
+/// The points of a cell's outline as seen from above, clockwise with y up: the hull of its points in the plane (Andrew's
+/// monotone chain), since the cell is convex.
+fn outline<const D: usize>(mesh: &PolyMesh<D>, cell: usize) -> Vec<u32> {
+    let place = |point: u32| {
+        let p = mesh.points()[point as usize];
+        [p[0], p[1]]
+    };
+    let mut points: Vec<u32> =
+        mesh.faces_of(cell).flat_map(|(face, _)| mesh.face(face)).copied().collect();
+    points.sort_unstable_by(|&a, &b| {
+        let [p, q] = [place(a), place(b)];
+        p[0].total_cmp(&q[0]).then(p[1].total_cmp(&q[1])).then(a.cmp(&b))
+    });
+    points.dedup_by(|a, b| place(*a) == place(*b));
+    let half = |order: &mut dyn Iterator<Item = u32>| {
+        let mut chain: Vec<u32> = Vec::new();
+        for point in order {
+            let turns = |chain: &[u32]| {
+                let [.., a, b] = *chain else { return true };
+                let ([a, b], c) = ([a, b].map(place), place(point));
+                (b[0] - a[0]) * (c[1] - a[1]) - (b[1] - a[1]) * (c[0] - a[0]) < 0.0
+            };
+            while !turns(&chain) {
+                chain.pop();
+            }
+            chain.push(point);
+        }
+        chain.pop(); // the other half begins with it
+        chain
+    };
+    let mut around = half(&mut points.iter().copied());
+    around.extend(half(&mut points.iter().rev().copied()));
+    around
 }
 
 fn npf(rock: &Rock, _dimension: usize) -> String {

@@ -20,6 +20,7 @@ use super::super::provenance::Provenance;
 use super::raw::{CellReadError, RawCells, read_bytes};
 use super::read_vtu::read_cells_vtu;
 use super::table::read_list;
+use super::{CellData, NO_CELL, WELL};
 
 /// Volumes may differ from the file's by this share of the mean volume: rounding on the way through the frame.
 const SAME_VOLUME: f64 = 1e-8;
@@ -39,6 +40,16 @@ pub struct LoadedCells<const D: usize> {
     pub frame: Frame<D>,
     /// Where they come from.
     pub provenance: Provenance,
+    /// The cell of each well, in their order; [`NO_CELL`] for one that no cell has.
+    pub wells: Vec<u32>,
+}
+
+impl<const D: usize> LoadedCells<D> {
+    /// The cells as they are written.
+    pub fn data(&self) -> CellData<'_, D> {
+        let Self { mesh, features, frame, provenance, wells, .. } = self;
+        CellData { mesh, features, frame, provenance, wells }
+    }
 }
 
 /// Voronoi cells whose dimension the file decides.
@@ -146,8 +157,34 @@ fn loaded<const D: usize>(
     };
     check_volumes(&mesh, &raw.volumes)?;
     let features = features(&mesh, &raw.features);
-    let RawCells { fields, skipped_fields, .. } = raw;
-    Ok(LoadedCells { mesh, features, fields, skipped_fields, frame, provenance })
+    let RawCells { mut fields, skipped_fields, .. } = raw;
+    let wells = take_wells(&mut fields);
+    Ok(LoadedCells { mesh, features, fields, skipped_fields, frame, provenance, wells })
+}
+
+/// The cell of each well, which files have as a field of their numbers.
+fn take_wells(fields: &mut Vec<OwnedField<f64>>) -> Vec<u32> {
+    // a field of somebody else's of that name has other numbers than those of wells, or one of them twice
+    let count = |field: &OwnedField<f64>| {
+        let all = field.values.len() as f64;
+        let is_number = |well: &f64| well.fract() == 0.0 && (0.0..=all).contains(well);
+        let mut numbers: Vec<u32> = field.values.iter().map(|&well| well as u32).collect();
+        numbers.sort_unstable();
+        let numbers = &numbers[numbers.partition_point(|&well| well == 0)..];
+        let once = numbers.windows(2).all(|pair| pair[0] < pair[1]);
+        let last = numbers.last().map(|&last| last as usize);
+        last.filter(|_| once && field.values.iter().all(is_number))
+    };
+    let place = fields.iter().position(|field| field.name == WELL);
+    let Some((place, count)) = place.and_then(|place| Some((place, count(&fields[place])?))) else {
+        return Vec::new();
+    };
+    let of_cells = fields.remove(place).values;
+    let mut wells = vec![NO_CELL; count];
+    for (cell, &well) in of_cells.iter().enumerate().filter(|(_, well)| **well > 0.0) {
+        wells[well as usize - 1] = cell as u32;
+    }
+    wells
 }
 
 fn flat<const D: usize>(place: &Point<3>) -> Point<D> {

@@ -16,7 +16,7 @@ use atomesh::watch::Watch;
 
 use super::super::error::MeshWriteError;
 use super::modflow::Rock;
-use super::{CellData, write_texts};
+use super::{CellData, wells_beside, wells_table, write_texts};
 
 /// A program that takes cells and what connects them.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -38,6 +38,8 @@ pub struct SimulatorFiles {
     pub grid: PathBuf,
     /// The sides of the box, by number: for PFLOTRAN alone.
     pub sides: Vec<PathBuf>,
+    /// The cells of wells: NAME-wells.csv, written where there are any.
+    pub wells: Option<PathBuf>,
 }
 
 impl SimulatorFiles {
@@ -49,12 +51,17 @@ impl SimulatorFiles {
             grid.with_file_name(name)
         };
         let count = if simulator == Simulator::Pflotran { 2 * dimension } else { 0 };
-        Self { simulator, grid: grid.into(), sides: (0..count).map(side).collect() }
+        let wells = Some(wells_beside(grid));
+        Self { simulator, grid: grid.into(), sides: (0..count).map(side).collect(), wells }
     }
 
     /// All of them.
     pub fn paths(&self) -> Vec<&Path> {
-        std::iter::once(&self.grid).chain(&self.sides).map(PathBuf::as_path).collect()
+        std::iter::once(&self.grid)
+            .chain(&self.sides)
+            .chain(&self.wells)
+            .map(PathBuf::as_path)
+            .collect()
     }
 }
 
@@ -74,6 +81,12 @@ pub fn write_simulator<const D: usize>(
     let cells = Cells { mesh: data.mesh, rock, faces: connections(data.mesh) };
     let mut texts = vec![(&files.grid, cells.grid(files.simulator))];
     texts.extend(files.sides.iter().zip(cells.sides()));
+    let wells = wells_table(data, |cell| match files.simulator {
+        Simulator::Pflotran => (cell + 1).to_string(),
+        Simulator::Tough => tough_name(cell),
+        Simulator::Opm => cell.to_string(),
+    });
+    texts.extend(files.wells.as_ref().zip(wells));
     write_texts(&texts, watch)
 }
 

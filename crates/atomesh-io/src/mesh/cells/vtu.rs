@@ -11,7 +11,7 @@ use super::super::error::MeshWriteError;
 use super::super::field::Values;
 use super::super::metadata;
 use super::super::vtu::appended::Head;
-use super::CellData;
+use super::{CellData, WELL};
 
 /// VTK's numbers for a polygon and a polyhedron.
 const POLYGON: u8 = 7;
@@ -26,7 +26,8 @@ pub(super) const FEATURE: &str = "feature";
 
 /// Writes polygons or polyhedra as a VTU file, which ParaView and meshio read, with the cell arrays `volume` (in 2-D
 /// the area) and `site` (`center` where cells have no sites). Faces on features are in the field data:
-/// `feature_cells`, the two cells of each, and `feature`, the number of its feature.
+/// `feature_cells`, the two cells of each, and `feature`, the number of its feature. Where there are wells, the cell array
+/// `well` has their numbers, from 1 on, and 0 elsewhere.
 ///
 /// Polyhedra stand in the order of their number of points, since meshio 5 sorts them so, but their data another way, and
 /// refuses files in which that differs. The array `cell` has each one's place in the mesh, the number by which other
@@ -56,6 +57,7 @@ pub fn write_cells_vtu_with<const D: usize>(
     let order = file_order(mesh);
     let topology = Topology::of(mesh, &order);
     let features = FeatureArrays::of(data);
+    let wells = data.well_of_cells();
     let points = padded(mesh.points());
     let mut head = Head::new("UnstructuredGrid");
     head.text("<FieldData>\n");
@@ -65,7 +67,7 @@ pub fn write_cells_vtu_with<const D: usize>(
     let vectors = "NumberOfComponents=\"3\"";
     head.text("</FieldData>\n");
     head.text(&format!("<Piece NumberOfPoints=\"{count}\" NumberOfCells=\"{cells}\">\n"));
-    name_cell_data(&mut head, mesh, &order, fields);
+    name_cell_data(&mut head, data, (&order, &wells), fields);
     head.text("<Points>\n");
     head.array("Float64", "Points", vectors, Column::slice(&points, Endian::Little));
     head.text("</Points>\n<Cells>\n");
@@ -99,13 +101,14 @@ fn corners_of<const D: usize>(mesh: &PolyMesh<D>, cell: usize) -> Vec<u32> {
     corners
 }
 
-/// Names what is known of the cells, in the file's order.
+/// Names what is known of the cells, in the file's order; of `wells` there is one number a cell, or none at all.
 fn name_cell_data<'a, const D: usize>(
     head: &mut Head<'a>,
-    mesh: &'a PolyMesh<D>,
-    order: &'a [u32],
+    data: &CellData<'a, D>,
+    (order, wells): (&'a [u32], &'a [u32]),
     fields: &CellFields<'a, D>,
 ) {
+    let mesh = data.mesh;
     let (little, cells) = (Endian::Little, order.len());
     let place = move |at: usize| order[at] as usize;
     let vector = |vectors: &'a [[f64; D]]| {
@@ -141,6 +144,10 @@ fn name_cell_data<'a, const D: usize>(
     }
     for field in fields.vectors() {
         head.array("Float64", field.name(), three, vector(field.vectors()));
+    }
+    if !wells.is_empty() {
+        let column = Column::numbers(cells, little, move |i| wells[place(i)]);
+        head.array("UInt32", WELL, "", column);
     }
     head.text("</CellData>\n");
 }

@@ -2,7 +2,7 @@
 //!
 //! Cells are CPS3 or C3D4 elements, numbered from 1 as in the mesh. Each region is a set of elements. Each
 //! group of facets is a surface of element faces, and a set of nodes of the same name; the elements are those
-//! behind the facets, as their normals show. Names lose their dots. Comments carry the numbers of groups and
+//! behind the facets, as their normals show. Groups of points are sets of nodes. Names lose their dots. Comments carry the numbers of groups and
 //! regions, the frame and the provenance; fields are left out. Sections, if asked for ([`Sections`]), name a material for each
 //! region; those whose constants are known stand before them, the others are for the user's own file to define.
 

@@ -37,6 +37,8 @@ enum Section {
     Elements(usize, Option<usize>),
     /// The named set.
     Set(String),
+    /// The last set of nodes.
+    NodeSet,
     /// The named surface.
     Surface(String),
 }
@@ -101,6 +103,7 @@ struct Reader {
     /// Element number to the place of its corners among those of its kind, and their count.
     elements: HashMap<u64, (usize, usize)>,
     sets: Vec<(String, Vec<u64>)>,
+    node_sets: Vec<(String, Vec<u64>)>,
     surfaces: Vec<SurfaceLine>,
     names: Names,
 }
@@ -162,6 +165,10 @@ impl Reader {
                 self.sets.push((name.clone(), Vec::new()));
                 Section::Set(name)
             }
+            "NSET" => {
+                self.node_sets.push((option("NSET"), Vec::new()));
+                Section::NodeSet
+            }
             "SURFACE" => Section::Surface(option("NAME")),
             _ => Section::Other,
         }
@@ -195,6 +202,12 @@ impl Reader {
                 // sets of sets are passed over
                 let numbers = words().filter_map(|word| word.parse::<u64>().ok());
                 if let Some((_, set)) = self.sets.last_mut() {
+                    set.extend(numbers);
+                }
+            }
+            Section::NodeSet => {
+                let numbers = words().filter_map(|word| word.parse::<u64>().ok());
+                if let Some((_, set)) = self.node_sets.last_mut() {
                     set.extend(numbers);
                 }
             }
@@ -236,12 +249,23 @@ impl Reader {
     fn finish(mut self) -> Result<AnyMesh, MeshReadError> {
         self.parts.metadata = Metadata::decode(self.json.as_bytes());
         self.names.close();
+        self.add_points();
         self.add_surfaces();
         self.add_regions();
         let cells = if self.parts.tetrahedra.is_empty() { 2 } else { 3 };
         let names = self.names.known.into_iter();
         self.parts.tags.names = names.map(|(below, id, name)| (cells - below, id, name)).collect();
         self.parts.into_mesh()
+    }
+
+    /// Takes the sets of nodes that atomesh has written for groups of points; those of facets are known by their faces.
+    fn add_points(&mut self) {
+        for (id, name) in self.parts.metadata.point_groups() {
+            let own = |(set, _): &&(String, Vec<u64>)| plain_name(&name).eq_ignore_ascii_case(set);
+            let Some((_, nodes)) = self.node_sets.iter().find(own) else { continue };
+            let points = nodes.iter().filter_map(|node| self.index_of.get(node));
+            self.parts.tags.points.extend(points.map(|&point| (point, id as i32)));
+        }
     }
 
     /// Puts the faces of surfaces into groups of their names.

@@ -60,6 +60,7 @@ pub fn write_inp<const D: usize>(
     if let Some(tags) = data.tags() {
         regions(&mut to, tags)?;
         facet_groups(&mut to, data, tags)?;
+        point_groups(&mut to, tags)?;
     }
     if let Some(given) = data.sections() {
         sections(&mut to, given, data.tags().and_then(Tags::regions))?;
@@ -161,6 +162,19 @@ fn facet_groups<W: Write, const D: usize>(
         for (number, _) in used() {
             to.line(format_args!("{name}_S{number}, S{number}"))?;
         }
+    }
+    Ok(())
+}
+
+fn point_groups<W: Write, const D: usize>(
+    to: &mut Lines<W>,
+    tags: &Tags<D>,
+) -> Result<(), MeshWriteError> {
+    for group in tags.point_groups() {
+        to.line(format_args!("*NSET, NSET={}", plain_name(&group.name)))?;
+        // of cells of second order the corners come first
+        let nodes: Vec<usize> = group.points.iter().map(|&point| point as usize + 1).collect();
+        to.list(&nodes)?;
     }
     Ok(())
 }

@@ -27,10 +27,18 @@ pub(super) struct FacetEntity<const D: usize> {
     pub facets: Vec<[u32; D]>,
 }
 
+/// A point of a group.
+pub(super) struct PointEntity {
+    /// The physical group.
+    pub physical: i32,
+    pub point: u32,
+}
+
 /// The entities of a mesh; each kind is numbered from 1 in its order here.
 pub(super) struct Entities<const D: usize> {
     pub cells: Vec<CellEntity>,
     pub facets: Vec<FacetEntity<D>>,
+    pub points: Vec<PointEntity>,
     /// Dimension, number and name of each physical group.
     pub names: Vec<(usize, i32, String)>,
     /// The regions and groups whose physical group has another number.
@@ -47,6 +55,7 @@ impl<const D: usize> Entities<D> {
         let mut entities = Self {
             cells: vec![whole],
             facets: vec![],
+            points: vec![],
             names: vec![],
             known_as: KnownAs::default(),
             of_cells: vec![],
@@ -56,9 +65,11 @@ impl<const D: usize> Entities<D> {
         if let Some(regions) = tags.regions() {
             entities.add_regions(regions);
             entities.add_groups(tags);
+            entities.add_points(tags);
             return entities;
         }
         entities.add_groups(tags);
+        entities.add_points(tags);
         let groups: Vec<i32> = entities.names.iter().map(|(_, number, _)| *number).collect();
         let domain = free_numbers(&groups).next().unwrap_or(i32::MAX);
         entities.cells[0].physicals = vec![domain];
@@ -109,6 +120,16 @@ impl<const D: usize> Entities<D> {
         }
     }
 
+    /// Groups of points have the numbers that are left: their own are in the comment.
+    fn add_points(&mut self, tags: &Tags<D>) {
+        let used: Vec<i32> = self.names.iter().map(|(_, number, _)| *number).collect();
+        for (group, physical) in tags.point_groups().iter().zip(free_numbers(&used)) {
+            self.names.push((0, physical, group.name.clone()));
+            let points = group.points.iter().map(|&point| PointEntity { physical, point });
+            self.points.extend(points);
+        }
+    }
+
     /// The place of a cell's entity.
     pub fn entity_of(&self, cell: usize) -> usize {
         self.of_cells.get(cell).map_or(0, |&at| at as usize)
@@ -132,6 +153,11 @@ impl<const D: usize> Entities<D> {
     /// How many facets there are, one of several groups counted for each.
     pub fn facet_count(&self) -> usize {
         self.facets.iter().map(|entity| entity.facets.len() * entity.physicals.len()).sum()
+    }
+
+    /// How many points of groups there are.
+    pub fn point_count(&self) -> usize {
+        self.points.len()
     }
 }
 

@@ -1,7 +1,7 @@
 //! The values of a field as MSH lists them: one for each element, in the file's order.
 //!
 //! Gmsh takes values by the numbers of elements and would do with those of cells. meshio takes them by the order
-//! of all elements, and refuses a list that does not reach them all. So facets have values too: that of the cell
+//! of all elements, and refuses a list that does not reach them all. So facets and points have values too: that of the cell
 //! behind them, which Gmsh then shows on them, and which leaves the range of a field as it is.
 
 use std::iter::repeat_n;
@@ -63,7 +63,7 @@ pub(super) fn element_cells<const D: usize>(
         MshVersion::V41 => entities.order().to_vec(),
         MshVersion::V22 => (0..mesh.cell_count() as u32).collect(),
     };
-    if entities.facets.is_empty() {
+    if entities.facets.is_empty() && entities.points.is_empty() {
         return of_elements;
     }
     let cells = mesh.cells_of_points();
@@ -79,5 +79,8 @@ pub(super) fn element_cells<const D: usize>(
         };
         of_elements.extend(repeat_n(behind, times).flatten());
     }
+    // a point has the value of the first of its cells
+    let first = |point: u32| cells.of(point).first().copied().unwrap_or(NOWHERE);
+    of_elements.extend(entities.points.iter().map(|entity| first(entity.point)));
     of_elements
 }

@@ -10,10 +10,9 @@ use super::super::column::{Endian, Number};
 use super::super::data::MeshData;
 use super::super::error::MeshWriteError;
 use super::super::format::{MshEncoding, MshVersion};
-use super::super::metadata;
 use super::entities::Entities;
 use super::values::{Quantity, element_cells};
-use super::{element_type, place};
+use super::{POINT, element_type, place};
 
 /// Bytes gathered before they are handed on.
 const CHUNK: usize = 1 << 18;
@@ -37,7 +36,7 @@ pub fn write_msh<const D: usize>(
     watch: &mut dyn Watch,
 ) -> Result<(), MeshWriteError> {
     let entities = Entities::of(data);
-    let elements = data.mesh().cell_count() + entities.facet_count();
+    let elements = data.mesh().cell_count() + entities.facet_count() + entities.point_count();
     let count = data.nodes().len().max(elements);
     if i32::try_from(count).is_err() {
         return Err(MeshWriteError::TooMany { format: "MSH", count, limit: i32::MAX as usize });
@@ -46,10 +45,7 @@ pub fn write_msh<const D: usize>(
     let steps = 2 + data.point_fields().len() + fields;
     let items = (steps * count.max(1)) as f64;
     let mut numbers = Numbers { out, bytes: vec![], encoding, watch, done: 0, items };
-    numbers.head(
-        version,
-        &metadata::encode_with_numbers(data.frame(), data.provenance(), &entities.known_as),
-    )?;
+    numbers.head(version, &data.metadata_with_numbers(&entities.known_as))?;
     physical_names(&mut numbers, &entities);
     match version {
         MshVersion::V41 => {
@@ -233,7 +229,7 @@ fn nodes_41<W: Write, const D: usize>(
     Ok(())
 }
 
-/// One block an entity: the cells of each region, and the facets after them, numbered from 1 in the order in which they
+/// One block an entity: the cells of each region, the facets after them, and points last, numbered from 1 in the order in which they
 /// stand, since readers that pass over numbers take values by that order. Where it is not the mesh's, a section of
 /// its own says it.
 fn elements_41<W: Write, const D: usize>(
@@ -243,9 +239,11 @@ fn elements_41<W: Write, const D: usize>(
 ) -> Result<(), MeshWriteError> {
     let (cell_count, each) = (data.mesh().cell_count(), data.nodes_per_cell());
     let is_quadratic = data.quadratic().is_some();
-    let count = cell_count + entities.facets.iter().map(|e| e.facets.len()).sum::<usize>();
+    let facet_count: usize = entities.facets.iter().map(|e| e.facets.len()).sum();
+    let count = cell_count + facet_count + entities.point_count();
+    let blocks = entities.cells.len() + entities.facets.len() + entities.points.len();
     to.text("$Elements\n");
-    to.sizes([entities.cells.len() + entities.facets.len(), count, count.min(1), count]);
+    to.sizes([blocks, count, count.min(1), count]);
     to.line();
     let mut tag = 0;
     for (at, (entity, cells)) in entities.cells_by_entity().enumerate() {
@@ -272,6 +270,15 @@ fn elements_41<W: Write, const D: usize>(
             data.facet_nodes(facet).iter().for_each(|&node| to.size(node as usize + 1));
             to.item()?;
         }
+    }
+    for (at, entity) in entities.points.iter().enumerate() {
+        to.ints([0, at + 1]);
+        to.put(POINT);
+        to.size(1);
+        to.line();
+        tag += 1;
+        to.sizes([tag, entity.point as usize + 1]);
+        to.item()?;
     }
     to.end("Elements");
     cell_order(to, entities.order())
@@ -317,9 +324,17 @@ fn entities_41<W: Write, const D: usize>(
     }
     to.text("$Entities\n");
     let mut counts = [0; 4];
-    (counts[D - 1], counts[D]) = (entities.facets.len(), entities.cells.len());
+    (counts[0], counts[D - 1], counts[D]) =
+        (entities.points.len(), entities.facets.len(), entities.cells.len());
     to.sizes(counts);
     to.line();
+    for (at, entity) in entities.points.iter().enumerate() {
+        to.int(at + 1);
+        to.point(&mesh.points()[entity.point as usize]);
+        to.size(1);
+        to.put(entity.physical);
+        to.line();
+    }
     let bounds = Bounds::of(mesh.points()).unwrap_or(Bounds { min: [0.0; D], max: [0.0; D] });
     let facets = entities.facets.iter().enumerate().map(|(at, e)| (at + 1, &e.physicals));
     let cells = entities.cells.iter().enumerate().map(|(at, e)| (at + 1, &e.physicals));
@@ -349,8 +364,8 @@ fn nodes_22<W: Write, const D: usize>(
     Ok(())
 }
 
-/// The cells as in the mesh, then the facets, one of several groups once for each: an element has one
-/// group in this version.
+/// The cells as in the mesh, then the facets, one of several groups once for each, since an element has one
+/// group in this version, and the points of groups.
 fn elements_22<W: Write, const D: usize>(
     to: &mut Numbers<W>,
     data: &MeshData<D>,
@@ -358,7 +373,8 @@ fn elements_22<W: Write, const D: usize>(
 ) -> Result<(), MeshWriteError> {
     let (cells, facets) = (data.mesh().cell_count(), entities.facet_count());
     let (each, is_quadratic) = (data.nodes_per_cell(), data.quadratic().is_some());
-    to.text(&format!("$Elements\n{}\n", cells + facets));
+    let points = entities.point_count();
+    to.text(&format!("$Elements\n{}\n", cells + facets + points));
     let text = to.encoding == MshEncoding::Text;
     if !text && cells > 0 {
         to.put(element_type(D, is_quadratic));
@@ -386,6 +402,16 @@ fn elements_22<W: Write, const D: usize>(
                 to.item()?;
             }
         }
+    }
+    if !text && points > 0 {
+        to.put(POINT);
+        to.ints([points, 2]);
+    }
+    for (at, entity) in entities.points.iter().enumerate() {
+        tag += 1;
+        let group = Group { physical: entity.physical, entity: at + 1 };
+        to.element_22(tag, POINT, group, &[entity.point]);
+        to.item()?;
     }
     to.end("Elements");
     Ok(())

@@ -9,9 +9,10 @@ use zip::result::ZipError;
 
 use super::super::field::OwnedField;
 use super::super::loaded::{AnyMesh, LoadedMesh};
-use super::super::metadata::Metadata;
+use super::super::metadata::{self, Metadata};
 use super::super::parts::loaded;
 use super::super::read_error::{MeshReadError, malformed};
+use super::super::tags::RawTags;
 
 /// Reads the mesh of an NPZ archive with the arrays `points` (n × 2 or n × 3, reals) and `cells`
 /// (m × 3 or m × 4, integers). Other arrays of n reals are fields at the points; arrays
@@ -89,6 +90,7 @@ impl<'a> Archive<'a> {
             return Err(MeshError::CornerCount { count: corners.len(), each: D + 1 }.into());
         }
         let mesh = Mesh::new(points, corners)?;
+        let mut tags = RawTags::default();
         let names: Vec<String> = self.zip.file_names().map(str::to_owned).collect();
         let (mut fields, mut cell_fields, mut skipped) = (Vec::new(), Vec::new(), Vec::new());
         for name in names.iter().filter_map(|n| n.strip_suffix(".npy")) {
@@ -104,6 +106,8 @@ impl<'a> Archive<'a> {
                 } else {
                     skipped.push(name.into());
                 }
+            } else if name == metadata::POINT_GROUP && array.shape == [mesh.points().len() as u64] {
+                tags.points_of(&array.indices()?);
             } else if array.shape == [mesh.points().len() as u64] {
                 let values = array.reals()?.into_iter().map(|v| v as f32).collect();
                 fields.push(OwnedField { name: array.name, values });
@@ -112,7 +116,10 @@ impl<'a> Archive<'a> {
             }
         }
         let metadata = self.metadata()?;
-        let mut loaded = loaded(mesh, fields, &metadata, 0);
+        tags.name_points(&metadata);
+        let (tags, left_out) = tags.into_tags(&mesh, Vec::new(), Vec::new())?;
+        let mut loaded = loaded(mesh, fields, &metadata, left_out);
+        loaded.tags = tags;
         (loaded.cell_fields, loaded.skipped_fields) = (cell_fields, skipped);
         Ok(loaded)
     }

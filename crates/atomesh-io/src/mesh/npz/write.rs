@@ -10,6 +10,7 @@ use super::super::column::{Column, Endian};
 use super::super::data::MeshData;
 use super::super::error::MeshWriteError;
 use super::super::field::{Field, Values};
+use super::super::metadata;
 use super::first_error::FirstError;
 
 /// Writes a mesh as NPZ; cells of second order as straight ones.
@@ -25,6 +26,8 @@ pub fn write_npz<const D: usize>(
     let (mesh, text) = (data.mesh(), data.metadata());
     let (points, cells) = (mesh.points(), mesh.cell_count());
     let coordinates = points.as_flattened();
+    // of the corners, which come first
+    let groups = data.tags().map_or_else(Vec::new, |tags| tags.group_of_points(points.len()));
     let mut arrays = vec![
         Array::new("points", "<f8", &[points.len(), D], Column::slice(coordinates, little)),
         Array::new("cells", "<u4", &[cells, D + 1], Column::slice(mesh.corners(), little)),
@@ -42,6 +45,10 @@ pub fn write_npz<const D: usize>(
     for field in data.cell_vectors() {
         let column = Column::slice(field.vectors().as_flattened(), little);
         arrays.push(Array::new(&format!("cell.{}", field.name()), "<f8", &[cells, D], column));
+    }
+    if !groups.is_empty() {
+        let column = Column::slice(&groups, little);
+        arrays.push(Array::new(metadata::POINT_GROUP, "<u4", &[groups.len()], column));
     }
     let bytes = Column::slice(text.as_bytes(), little);
     arrays.push(Array::new("metadata", &format!("|S{}", text.len()), &[], bytes));

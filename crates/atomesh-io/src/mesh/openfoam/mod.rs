@@ -14,8 +14,8 @@ pub use read::read_foam_mesh;
 pub use write::{check_foam_mesh_writable, write_foam_mesh};
 
 /// The names of the files in the folder, in the order in which they are written.
-const FILES: [&str; 7] =
-    ["points", "faces", "owner", "neighbour", "boundary", "faceZones", "cellZones"];
+const FILES: [&str; 8] =
+    ["points", "faces", "owner", "neighbour", "boundary", "pointZones", "faceZones", "cellZones"];
 
 /// The patch of the ends of prisms that stand for flat cells.
 pub const FRONT_AND_BACK: &str = "frontAndBack";
@@ -63,6 +63,15 @@ pub struct CellZone {
     pub cells: Vec<u32>,
 }
 
+/// A named set of points, such as a well.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub struct PointZone {
+    /// Its name.
+    pub name: String,
+    /// The points by index.
+    pub points: Vec<u32>,
+}
+
 /// Cells of any shape, given by their faces.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct FoamMesh {
@@ -74,6 +83,7 @@ pub struct FoamMesh {
     corners: Vec<u32>,
     owners: Vec<u32>,
     beyond: Vec<Beyond>,
+    point_zones: Vec<PointZone>,
     face_zones: Vec<FaceZone>,
     cell_zones: Vec<CellZone>,
     note: String,
@@ -163,6 +173,20 @@ impl FoamMesh {
         Ok(())
     }
 
+    /// Adds a named set of points.
+    ///
+    /// # Errors
+    /// [`FoamMeshError::Missing`] if a point is not there.
+    pub fn push_point_zone(&mut self, zone: PointZone) -> Result<(), FoamMeshError> {
+        let count = self.points.len();
+        if let Some(&found) = zone.points.iter().find(|&&point| point as usize >= count) {
+            let of = format!("zone {:?}", zone.name);
+            return Err(FoamMeshError::Missing { of, what: "point", found, count });
+        }
+        self.point_zones.push(zone);
+        Ok(())
+    }
+
     /// Adds a named set of faces. OpenFOAM lets a face be in one zone at most.
     ///
     /// # Errors
@@ -227,6 +251,11 @@ impl FoamMesh {
         &self.patches
     }
 
+    /// The named sets of points.
+    pub fn point_zones(&self) -> &[PointZone] {
+        &self.point_zones
+    }
+
     /// The named sets of faces.
     pub fn face_zones(&self) -> &[FaceZone] {
         &self.face_zones
@@ -259,6 +288,7 @@ impl FoamMesh {
             points: self.points.clone(),
             cell_count: self.cell_count,
             patches: self.patches.clone(),
+            point_zones: self.point_zones.clone(),
             cell_zones: self.cell_zones.clone(),
             note: self.note.clone(),
             ..Self::default()

@@ -5,7 +5,7 @@ use std::path::Path;
 use std::str::FromStr;
 
 use super::super::read_error::{MeshReadError, excerpt, malformed};
-use super::{Beyond, CellZone, FaceZone, FoamMesh, FoamMeshError, Patch};
+use super::{Beyond, CellZone, FaceZone, FoamMesh, FoamMeshError, Patch, PointZone};
 
 /// Reads the cells in a polyMesh folder, as text; zones may be missing. Patches of other types than
 /// `empty` are taken as plain ones.
@@ -40,14 +40,21 @@ pub fn read_foam_mesh(folder: &Path) -> Result<FoamMesh, MeshReadError> {
         };
         mesh.push_face(corners, owner, beyond).map_err(wrong)?;
     }
+    if let Ok(zones) = fs::read(folder.join("pointZones")) {
+        let zones = File::new("pointZones", &zones)?.list(|file| plain_zone(file, "a point"))?;
+        for (name, points) in zones {
+            mesh.push_point_zone(PointZone { name, points }).map_err(wrong)?;
+        }
+    }
     if let Ok(zones) = fs::read(folder.join("faceZones")) {
         for zone in File::new("faceZones", &zones)?.list(face_zone)? {
             mesh.push_face_zone(zone).map_err(wrong)?;
         }
     }
     if let Ok(zones) = fs::read(folder.join("cellZones")) {
-        for zone in File::new("cellZones", &zones)?.list(cell_zone)? {
-            mesh.push_cell_zone(zone).map_err(wrong)?;
+        let zones = File::new("cellZones", &zones)?.list(|file| plain_zone(file, "a cell"))?;
+        for (name, cells) in zones {
+            mesh.push_cell_zone(CellZone { name, cells }).map_err(wrong)?;
         }
     }
     Ok(mesh)
@@ -206,7 +213,7 @@ fn zone<'a>(
     loop {
         match file.word()? {
             "}" => return Ok(name),
-            word @ ("faceLabels" | "flipMap" | "cellLabels") => {
+            word @ ("pointLabels" | "faceLabels" | "flipMap" | "cellLabels") => {
                 file.word()?; // List<label>
                 list(word, file)?;
             }
@@ -231,11 +238,12 @@ fn face_zone(file: &mut File) -> Result<FaceZone, MeshReadError> {
     Ok(FaceZone { name, faces })
 }
 
-fn cell_zone(file: &mut File) -> Result<CellZone, MeshReadError> {
-    let mut cells = Vec::new();
+/// The name of a zone that is a list of numbers, and these.
+fn plain_zone(file: &mut File, what: &'static str) -> Result<(String, Vec<u32>), MeshReadError> {
+    let mut members = Vec::new();
     let name = zone(file, |_, file| {
-        cells = file.list(|file| file.number("a cell"))?;
+        members = file.list(|file| file.number(what))?;
         Ok(())
     })?;
-    Ok(CellZone { name, cells })
+    Ok((name, members))
 }

@@ -6,14 +6,14 @@ use atomesh::mesh::{Mesh, Tags};
 
 use super::super::data::MeshData;
 use super::super::metadata;
-use super::{Beyond, CellZone, FaceZone, FoamMesh, FoamMeshError, Patch};
+use super::{Beyond, CellZone, FaceZone, FoamMesh, FoamMeshError, Patch, PointZone};
 
 /// The patch of the hull's facets that no group has.
 const OTHER: &str = "defaultFaces";
 
 impl FoamMesh {
-    /// The mesh with its tags: groups of facets become patches on the hull and face zones inside, regions
-    /// become cell zones. A facet of several groups is given to the first. Fields are left out. Flat meshes
+    /// The mesh with its tags: groups of facets become patches on the hull and face zones inside, groups of points point
+    /// zones, regions cell zones. A facet of several groups is given to the first. Fields are left out. Flat meshes
     /// become prisms as high as the square root of the mean area of cells.
     ///
     /// # Errors
@@ -52,6 +52,15 @@ impl FoamMesh {
         let mut made = with_faces(mesh, &faces, patches)?.without_empty_patches();
         for zone in zones.into_iter().filter(|zone| !zone.faces.is_empty()) {
             made.push_face_zone(zone)?;
+        }
+        for group in tags.point_groups() {
+            let mut points = group.points.clone();
+            if D == 2 {
+                // and what stands above them
+                let up = mesh.points().len() as u32;
+                points.extend(group.points.iter().map(|point| point + up));
+            }
+            made.push_point_zone(PointZone { name: group.name.clone(), points })?;
         }
         for (name, cells) in regions(tags) {
             made.push_cell_zone(CellZone { name, cells })?;

@@ -73,6 +73,7 @@ fn write_files(
             "owner" => owners(&mut lines, mesh)?,
             "neighbour" => neighbours(&mut lines, mesh)?,
             "boundary" => boundary(&mut lines, mesh)?,
+            "pointZones" => point_zones(&mut lines, mesh)?,
             "faceZones" => face_zones(&mut lines, mesh)?,
             _ => cell_zones(&mut lines, mesh)?,
         }
@@ -200,6 +201,11 @@ fn boundary(to: &mut Lines, mesh: &FoamMesh) -> Result<(), MeshWriteError> {
     to.line(format_args!(")"))
 }
 
+fn point_zones(to: &mut Lines, mesh: &FoamMesh) -> Result<(), MeshWriteError> {
+    let zones = mesh.point_zones.iter().map(|zone| (zone.name.as_str(), &zone.points[..]));
+    plain_zones(to, ["pointZones", "pointZone", "pointLabels"], zones)
+}
+
 fn face_zones(to: &mut Lines, mesh: &FoamMesh) -> Result<(), MeshWriteError> {
     to.head("regIOobject", "faceZones", "")?;
     to.line(format_args!("{}\n(", mesh.face_zones.len()))?;
@@ -220,13 +226,23 @@ fn face_zones(to: &mut Lines, mesh: &FoamMesh) -> Result<(), MeshWriteError> {
 }
 
 fn cell_zones(to: &mut Lines, mesh: &FoamMesh) -> Result<(), MeshWriteError> {
-    to.head("regIOobject", "cellZones", "")?;
-    to.line(format_args!("{}\n(", mesh.cell_zones.len()))?;
-    for zone in &mesh.cell_zones {
-        to.line(format_args!("{}\n{{\n    type cellZone;", zone.name))?;
-        to.line(format_args!("cellLabels      List<label>\n{}\n(", zone.cells.len()))?;
-        for cell in &zone.cells {
-            to.line(format_args!("{cell}"))?;
+    let zones = mesh.cell_zones.iter().map(|zone| (zone.name.as_str(), &zone.cells[..]));
+    plain_zones(to, ["cellZones", "cellZone", "cellLabels"], zones)
+}
+
+/// Zones that are lists of numbers, by the names of the file, of their type, and of their lists.
+fn plain_zones<'a>(
+    to: &mut Lines,
+    [file, kind, labels]: [&str; 3],
+    zones: impl ExactSizeIterator<Item = (&'a str, &'a [u32])>,
+) -> Result<(), MeshWriteError> {
+    to.head("regIOobject", file, "")?;
+    to.line(format_args!("{}\n(", zones.len()))?;
+    for (name, members) in zones {
+        to.line(format_args!("{name}\n{{\n    type {kind};"))?;
+        to.line(format_args!("{labels}      List<label>\n{}\n(", members.len()))?;
+        for member in members {
+            to.line(format_args!("{member}"))?;
         }
         to.line(format_args!(")\n;\n}}"))?;
     }

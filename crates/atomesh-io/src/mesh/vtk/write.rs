@@ -52,20 +52,21 @@ pub fn write_vtk<const D: usize>(
     let kind = i32::from(vtu::cell_type(count));
     Column::numbers(cells, big, move |_| kind).write(out)?;
     writeln!(out, "\nPOINT_DATA {points}")?;
-    fields::<D>(out, data.point_fields(), &[])?;
+    fields::<D>(out, data.point_fields(), &[], &data.group_of_points())?;
     check(watch, Phase::Write, 0.9, None)?;
     writeln!(out, "CELL_DATA {cells}")?;
-    fields(out, data.cell_fields(), data.cell_vectors())?;
+    fields(out, data.cell_fields(), data.cell_vectors(), &[])?;
     Ok(())
 }
 
-/// Numbers, then vectors of three components, z being 0 in flat meshes.
+/// Numbers, then vectors of three components, z being 0 in flat meshes, and the groups of points, if there are any.
 fn fields<const D: usize>(
     out: &mut impl Write,
     fields: &[Field],
     vectors: &[VectorField<D>],
+    groups: &[u32],
 ) -> Result<(), MeshWriteError> {
-    let count = fields.len() + vectors.len();
+    let count = fields.len() + vectors.len() + usize::from(!groups.is_empty());
     if count == 0 {
         return Ok(());
     }
@@ -82,6 +83,11 @@ fn fields<const D: usize>(
     for field in vectors {
         writeln!(out, "{} 3 {} double", field.name(), field.vectors().len())?;
         Column::points(field.vectors(), Endian::Big).write(out)?;
+        writeln!(out)?;
+    }
+    if !groups.is_empty() {
+        writeln!(out, "{} 1 {} unsigned_int", metadata::POINT_GROUP, groups.len())?;
+        Column::slice(groups, Endian::Big).write(out)?;
         writeln!(out)?;
     }
     Ok(())

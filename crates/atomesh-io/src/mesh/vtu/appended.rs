@@ -67,9 +67,13 @@ impl<'a> Head<'a> {
         self.text(&format!("{:OFFSET_WIDTH$}/>\n", "0\""));
     }
 
-    pub fn fields(&mut self, tag: &str, fields: &[Field<'a>]) {
+    /// Names fields within a tag, then an array of UInt32.
+    pub fn fields(&mut self, tag: &str, fields: &[Field<'a>], numbers: Option<(&str, Column<'a>)>) {
         self.text(&format!("<{tag}>\n"));
         fields.iter().for_each(|field| self.field(field));
+        if let Some((name, column)) = numbers {
+            self.array("UInt32", name, "", column);
+        }
         self.text(&format!("</{tag}>\n"));
     }
 

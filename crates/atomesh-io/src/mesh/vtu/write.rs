@@ -4,7 +4,8 @@
 //! fit; fields are Float32 or Float64, as they were given. Regions are the cell array `region`, Int32, with
 //! `region_ids` and `region_names` in the field data. The field data also hold the groups of facets: `facets`,
 //! the corners of each; `facet_group`, the number of its group; `facet_group_ids` and `facet_group_names`.
-//! Names are text, UInt8, one a line.
+//! Names are text, UInt8, one a line. Groups of points are the point array `point_group`, UInt32, the number of each
+//! one's group; their names are in the JSON text.
 
 use std::io::{Seek, Write};
 
@@ -28,12 +29,13 @@ pub fn write_vtu<const D: usize>(
 ) -> Result<(), MeshWriteError> {
     let text = data.metadata();
     let tags = data.tags().map(TagArrays::new).unwrap_or_default();
+    let groups = data.group_of_points();
     let mut head = Head::new("UnstructuredGrid");
     head.text("<FieldData>\n");
     head.field_data("UInt8", metadata::NAME, Column::slice(text.as_bytes(), Endian::Little));
     tags.name_in(&mut head, D);
     head.text("</FieldData>\n");
-    piece(&mut head, data);
+    piece(&mut head, data, &groups);
     head.write(out, watch)
 }
 
@@ -88,11 +90,13 @@ impl TagArrays {
 }
 
 /// Names the arrays of the mesh and its fields.
-fn piece<'a, const D: usize>(head: &mut Head<'a>, data: &MeshData<'a, D>) {
+fn piece<'a, const D: usize>(head: &mut Head<'a>, data: &MeshData<'a, D>, groups: &'a [u32]) {
     let mesh = data.mesh();
     let (points, cells, corners) = (data.nodes().len(), mesh.cell_count(), data.cell_nodes());
     head.text(&format!("<Piece NumberOfPoints=\"{points}\" NumberOfCells=\"{cells}\">\n"));
-    head.fields("PointData", data.point_fields());
+    let of_points = (!groups.is_empty())
+        .then(|| (metadata::POINT_GROUP, Column::slice(groups, Endian::Little)));
+    head.fields("PointData", data.point_fields(), of_points);
     let regions = data.tags().and_then(Tags::regions);
     let region = regions.map(|r| ("region", Column::slice(&r.of_cells, Endian::Little)));
     head.cell_data(data.cell_fields(), data.cell_vectors(), region);

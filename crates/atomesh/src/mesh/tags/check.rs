@@ -2,7 +2,7 @@
 
 use std::collections::HashSet;
 
-use super::{FacetGroup, Tags, ascending};
+use super::{FacetGroup, PointGroup, Tags, ascending};
 use crate::mesh::Mesh;
 
 /// The first promise that tags break.
@@ -10,9 +10,7 @@ use crate::mesh::Mesh;
 #[non_exhaustive]
 pub enum TagsError {
     /// A group's number is 0, or that of another group.
-    #[error(
-        "facet group {name:?} has the id {id}; expected 1 or more, other than those of other groups"
-    )]
+    #[error("group {name:?} has the id {id}; expected 1 or more, other than those of other groups")]
     Id {
         /// The group's name.
         name: String,
@@ -42,6 +40,16 @@ pub enum TagsError {
         name: String,
         /// The facet's corners.
         facet: Vec<u32>,
+    },
+    /// A point is not one of the mesh, or in two groups.
+    #[error(
+        "point group {name:?} has the point {point}; expected points of the mesh, each in one group"
+    )]
+    Point {
+        /// The group's name.
+        name: String,
+        /// The point's place.
+        point: u32,
     },
     /// There is not one region for each cell.
     #[error("regions of {found} cells for a mesh of {expected}")]
@@ -76,6 +84,13 @@ pub(super) fn check_names<const D: usize>(tags: &Tags<D>) -> Result<(), TagsErro
         }
         names.push(&group.name);
     }
+    ids.clear();
+    for group in &tags.point_groups {
+        if group.id == 0 || !ids.insert(group.id) {
+            return Err(TagsError::Id { name: group.name.clone(), id: group.id });
+        }
+        names.push(&group.name);
+    }
     let named = tags.regions.iter().flat_map(|regions| &regions.names);
     let mut named: Vec<&(i32, String)> = named.collect();
     names.extend(named.iter().map(|(_, name)| name.as_str()));
@@ -102,6 +117,18 @@ fn is_name(name: &str) -> bool {
     name.len() <= 64
         && name.starts_with(|c: char| c.is_ascii_alphabetic())
         && name.bytes().all(plain)
+}
+
+/// Whether the groups hold points of a mesh of `count`, each once.
+pub(super) fn check_points(count: usize, groups: &[PointGroup]) -> Result<(), TagsError> {
+    let mut taken = HashSet::new();
+    for group in groups {
+        let is_odd = |point: &&u32| **point as usize >= count || !taken.insert(**point);
+        if let Some(&point) = group.points.iter().find(is_odd) {
+            return Err(TagsError::Point { name: group.name.clone(), point });
+        }
+    }
+    Ok(())
 }
 
 /// Whether the groups hold facets of the mesh, each once.

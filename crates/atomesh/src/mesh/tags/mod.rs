@@ -1,7 +1,7 @@
-//! Tags: named groups of facets and cells, by which a solver knows boundaries, features and regions.
+//! Tags: named groups of facets, points and cells, by which a solver knows boundaries, features, wells and regions.
 //!
 //! Tags name points and cells by number: they fit only the mesh that they were made for, wherever its points are moved
-//! to. A facet may be in several groups. Every mesh format can hold their names.
+//! to. A facet may be in several groups, a point in one. Every mesh format can hold their names.
 
 mod check;
 mod names;
@@ -13,7 +13,9 @@ use std::collections::{HashMap, HashSet};
 
 use super::Mesh;
 pub use check::TagsError;
-pub use names::{MASK_NAME, feature_name, interface_name, is_feature_name, region_name, side_name};
+pub use names::{
+    MASK_NAME, feature_name, interface_name, is_feature_name, region_name, side_name, well_name,
+};
 
 /// A named group of facets.
 #[derive(Clone, Debug, PartialEq, Eq)]
@@ -25,6 +27,17 @@ pub struct FacetGroup<const D: usize> {
     /// The facets as their corners, points of the mesh. Their order is the facet's orientation: see
     /// [`Mesh::facet_of`].
     pub facets: Vec<[u32; D]>,
+}
+
+/// A named group of points.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub struct PointGroup {
+    /// The group's number, 1 or more, counted apart from those of facets.
+    pub id: u32,
+    /// Its name, as a [`FacetGroup`] has one.
+    pub name: String,
+    /// The points, by their places in the mesh.
+    pub points: Vec<u32>,
 }
 
 /// The region that each cell belongs to.
@@ -52,10 +65,11 @@ impl Regions {
     }
 }
 
-/// Named groups of facets and cells of a mesh. The default has none.
+/// Named groups of facets, points and cells of a mesh. The default has none.
 #[derive(Clone, Debug, Default, PartialEq, Eq)]
 pub struct Tags<const D: usize> {
     facet_groups: Vec<FacetGroup<D>>,
+    point_groups: Vec<PointGroup>,
     regions: Option<Regions>,
 }
 
@@ -76,9 +90,24 @@ impl<const D: usize> Tags<D> {
                 return Err(TagsError::RegionCount { found, expected });
             }
         }
-        let tags = Self { facet_groups, regions };
+        let tags = Self { facet_groups, point_groups: Vec::new(), regions };
         check::check_names(&tags)?;
         Ok(tags)
+    }
+
+    /// The same with groups of points of `mesh` in place of those that there are.
+    ///
+    /// # Errors
+    /// [`TagsError`] names the first id, name or point that does not fit; a point may be in one group.
+    pub fn with_point_groups(
+        mut self,
+        mesh: &Mesh<D>,
+        point_groups: Vec<PointGroup>,
+    ) -> Result<Self, TagsError> {
+        check::check_points(mesh.points().len(), &point_groups)?;
+        self.point_groups = point_groups;
+        check::check_names(&self)?;
+        Ok(self)
     }
 
     /// The groups of facets.
@@ -91,6 +120,23 @@ impl<const D: usize> Tags<D> {
         self.facet_groups.iter().find(|group| group.name == name)
     }
 
+    /// The groups of points.
+    pub fn point_groups(&self) -> &[PointGroup] {
+        &self.point_groups
+    }
+
+    /// The id of each point's group, 0 for none, of a mesh of `count` points. Empty if there are no groups.
+    pub fn group_of_points(&self, count: usize) -> Vec<u32> {
+        if self.point_groups.is_empty() {
+            return Vec::new();
+        }
+        let mut groups = vec![0; count];
+        for group in &self.point_groups {
+            group.points.iter().for_each(|&point| groups[point as usize] = group.id);
+        }
+        groups
+    }
+
     /// The cells' regions.
     pub fn regions(&self) -> Option<&Regions> {
         self.regions.as_ref()
@@ -98,12 +144,12 @@ impl<const D: usize> Tags<D> {
 
     /// Whether there are no groups and no regions.
     pub fn is_empty(&self) -> bool {
-        self.facet_groups.is_empty() && self.regions.is_none()
+        self.facet_groups.is_empty() && self.point_groups.is_empty() && self.regions.is_none()
     }
 
     /// These tags and those of `other`, both of the same mesh. Groups of one name become one, which has each facet once,
     /// oriented as in these tags. Groups that only `other` has keep their ids if these are free, or else get the next
-    /// ones.
+    /// ones. Points are those of these tags, or if these have none, of `other`.
     ///
     /// # Errors
     /// [`TagsError`] if both have regions, or a region of one has the name of a group of the other.
@@ -128,6 +174,9 @@ impl<const D: usize> Tags<D> {
             ids.insert(group.id);
             greatest = greatest.max(group.id);
             self.facet_groups.push(group);
+        }
+        if self.point_groups.is_empty() {
+            self.point_groups = other.point_groups;
         }
         self.regions = match (self.regions, other.regions) {
             (Some(_), Some(_)) => return Err(TagsError::TwoRegions),

@@ -21,6 +21,11 @@ pub fn is_feature_name(name: &str) -> bool {
     name.strip_prefix("feature-").is_some_and(|number| number.parse::<u32>().is_ok())
 }
 
+/// The name of a point that was to stay where it is, such as a well, by its number from 1 on: `well-1`.
+pub fn well_name(number: u32) -> String {
+    format!("well-{number}")
+}
+
 /// The name of the facets between cells of two labels, the lower first: `interface-2-5`.
 pub fn interface_name(labels: [i32; 2]) -> String {
     format!("interface-{}-{}", labels[0], labels[1])

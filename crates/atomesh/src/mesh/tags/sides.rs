@@ -32,7 +32,7 @@ impl<const D: usize> Tags<D> {
         for group in &mut groups {
             drop_pairs(&mut group.facets);
         }
-        Self { facet_groups: groups, regions: None }
+        Self { facet_groups: groups, ..Self::default() }
     }
 }
 

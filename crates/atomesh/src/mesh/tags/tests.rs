@@ -98,3 +98,28 @@ fn merging_joins_groups_of_one_name_and_numbers_others_on() {
     assert_eq!([found.name(3), found.name(-1)], ["rock", "region--1"]);
     assert_eq!(merged.merge(with_regions), Err(TagsError::TwoRegions));
 }
+
+#[test]
+fn points_are_in_one_group_and_names_are_of_one_tag() {
+    let mesh = square();
+    let wells = |id, name: &str, points: &[u32]| PointGroup {
+        id,
+        name: name.into(),
+        points: points.to_vec(),
+    };
+    let with = |groups| Tags::default().with_point_groups(&mesh, groups);
+    let tags = with(vec![wells(1, "well-1", &[2]), wells(3, "tips", &[0, 3])]).unwrap();
+    assert_eq!(tags.group_of_points(4), [3, 0, 1, 3]);
+    assert!(!tags.is_empty());
+    let sides = Tags::sides(&mesh, &Bounds::of(mesh.points()).unwrap(), 0.0);
+    assert_eq!(sides.clone().merge(tags.clone()).unwrap().point_groups(), tags.point_groups());
+    let point = |name: &str, point| Err(TagsError::Point { name: name.into(), point });
+    assert_eq!(with(vec![wells(1, "a", &[4])]), point("a", 4));
+    assert_eq!(with(vec![wells(1, "a", &[1]), wells(2, "b", &[1])]), point("b", 1));
+    assert_eq!(
+        with(vec![wells(1, "a", &[1]), wells(1, "b", &[2])]),
+        Err(TagsError::Id { name: "b".into(), id: 1 })
+    );
+    let taken = sides.with_point_groups(&mesh, vec![wells(1, "xmin", &[1])]);
+    assert_eq!(taken, Err(TagsError::Name { name: "xmin".into() }));
+}

@@ -89,7 +89,7 @@ impl Reader<'_> {
         })
     }
 
-    /// Reads the corners of a cell, and keeps it if it is a triangle, a tetrahedron, or a line of a physical
+    /// Reads the corners of a cell, and keeps it if it is a triangle, a tetrahedron, or a line or point of a physical
     /// group.
     fn cell(
         &mut self,
@@ -110,7 +110,7 @@ impl Reader<'_> {
         self.parts.has_quadratic |= is_quadratic;
         for k in 0..corners {
             let tag = read(self)?;
-            if matches!(kind, 1 | 2 | 4) && k < corners_of(kind) {
+            if matches!(kind, 1 | 2 | 4 | 15) && k < corners_of(kind) {
                 let index = self.index_of.index(tag);
                 cell[k] = index.ok_or_else(|| {
                     malformed(self.from.at, "a point's tag before this", tag.to_string())
@@ -120,8 +120,12 @@ impl Reader<'_> {
         let [a, b, c, _] = cell;
         let region = physicals.first().copied().unwrap_or(0);
         let tags = &mut self.parts.tags;
-        tags.has_regions |= region != 0 && kind != 1;
+        tags.has_regions |= region != 0 && !matches!(kind, 1 | 15);
         match kind {
+            15 if region != 0 => {
+                self.parts.cell_kinds.push(0);
+                tags.points.push((a, region));
+            }
             1 if region != 0 => {
                 self.parts.cell_kinds.push(0);
                 tags.edges.extend(physicals.iter().map(|&id| ([a, b], id)));
@@ -144,9 +148,10 @@ impl Reader<'_> {
     }
 }
 
-/// How many corners a line (Gmsh's type 1), a triangle (2) or a tetrahedron (4) has.
+/// How many corners a point (Gmsh's type 15), a line (1), a triangle (2) or a tetrahedron (4) has.
 fn corners_of(kind: i32) -> usize {
     match kind {
+        15 => 1,
         1 => 2,
         2 => 3,
         _ => 4,

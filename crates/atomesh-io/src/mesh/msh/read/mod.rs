@@ -298,7 +298,7 @@ impl Reader<'_> {
         tags.triangles.iter_mut().for_each(|(_, id)| give(&group, id));
         // names of facets have a lower dimension, those of cells the greatest
         let cells = if is_flat { 2 } else { 3 };
-        for (dimension, id, _) in &mut tags.names {
+        for (dimension, id, _) in tags.names.iter_mut().filter(|(dimension, ..)| *dimension > 0) {
             give(if *dimension == cells { &region } else { &group }, id);
         }
     }
