@@ -1,6 +1,6 @@
 //! Atoms on features: on nodes, then on curves, then, in space, on surfaces.
 
-use rayon::prelude::*;
+use crate::parallel::prelude::*;
 
 use crate::crests::{Foot, Pieces};
 use crate::fields::NominalDistance;

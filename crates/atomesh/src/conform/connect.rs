@@ -1,6 +1,6 @@
 //! Connecting atoms so that no edge crosses a feature.
 
-use rayon::prelude::*;
+use crate::parallel::prelude::*;
 
 use crate::crests::Pieces;
 use crate::fields::NominalDistance;

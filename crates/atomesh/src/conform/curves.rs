@@ -1,6 +1,6 @@
 //! All curves of all pieces, where they meet, and the atoms on them.
 
-use rayon::prelude::*;
+use crate::parallel::prelude::*;
 
 use crate::crests::Pieces;
 use crate::fields::NominalDistance;

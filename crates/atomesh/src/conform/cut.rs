@@ -1,6 +1,6 @@
 //! The cells that features pass through.
 
-use rayon::prelude::*;
+use crate::parallel::prelude::*;
 
 use crate::crests::Pieces;
 use crate::fields::NominalDistance;

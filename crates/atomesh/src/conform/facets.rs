@@ -4,7 +4,7 @@
 //! two whose corners all lie on the piece belongs to it. So a piece is one sheet: as the border of a set of cells it
 //! has an end or border only where the piece ends, or is not met.
 
-use rayon::prelude::*;
+use crate::parallel::prelude::*;
 
 use crate::crests::Pieces;
 use crate::fields::NominalDistance;

@@ -25,7 +25,7 @@ mod unmet;
 
 use std::collections::HashSet;
 
-use rayon::prelude::*;
+use crate::parallel::prelude::*;
 
 use crate::crests::Pieces;
 use crate::fields::{FieldsView, NominalDistance, ScalarField};

@@ -1,6 +1,6 @@
 //! Edges that cross features, and what is done about them.
 
-use rayon::prelude::*;
+use crate::parallel::prelude::*;
 
 use crate::crests::Pieces;
 use crate::fields::NominalDistance;
@@ -56,7 +56,7 @@ pub(super) fn heights<const D: usize>(
 
 /// The edges of cells whose ends lie on two sides of a piece, ascending by ends.
 pub(super) fn edges_across<'a, const D: usize>(
-    cells: impl ParallelIterator<Item = &'a [u32]>,
+    cells: impl Parallel<Item = &'a [u32]>,
     heights: &[Vec<(u32, f64)>],
     pieces: &Pieces<D>,
 ) -> Vec<[u32; 2]> {

@@ -1,6 +1,6 @@
 //! What of features no facet of theirs lies on.
 
-use rayon::prelude::*;
+use crate::parallel::prelude::*;
 
 use crate::crests::Pieces;
 use crate::fields::NominalDistance;

@@ -3,7 +3,7 @@
 //! The strongest points are taken first, each so far from those before it on the same feature as its spacing asks for.
 //! Then every site moves to the centroid of the points nearest to it eight times.
 
-use rayon::prelude::*;
+use crate::parallel::prelude::*;
 
 use super::FeaturePoint;
 use crate::fields::NominalDistance;

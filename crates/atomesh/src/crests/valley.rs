@@ -12,8 +12,8 @@ use super::FeaturePoint;
 use crate::geometry::dot;
 use crate::geometry::linear::{Matrix, largest_eigenpair};
 use crate::image::{coordinates, gaussian_derivative_into};
+use crate::parallel::prelude::*;
 use crate::watch::{Cancelled, Phase, Watch, check};
-use rayon::prelude::*;
 
 /// The least curvature across a valley, per sample squared.
 const LEAST_CURVATURE: f64 = 1e-3;

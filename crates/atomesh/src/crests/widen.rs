@@ -6,7 +6,7 @@
 
 use super::FeaturePoint;
 use crate::image::Grid;
-use rayon::prelude::*;
+use crate::parallel::prelude::*;
 use std::ops::Range;
 
 /// The radius of the disc of feature about a point, in samples along the disc's steepest axis: at least half the

@@ -4,7 +4,7 @@
 //! each pair twice, once for either atom: an atom can then gather its own sum, in the same order at any
 //! thread count.
 
-use rayon::prelude::*;
+use crate::parallel::prelude::*;
 
 use super::lanes::{LANES, Lanes, Plain, WIDTH};
 use super::tree::{NearBlocks, Tree};

@@ -12,7 +12,7 @@
 
 use std::ops::Range;
 
-use rayon::prelude::*;
+use crate::parallel::prelude::*;
 
 use crate::fields::{FieldsView, NominalDistance, centred_difference};
 use crate::geometry::Point;

@@ -10,7 +10,7 @@
 //! The tree works in single precision, in units of the atoms' extent; reaches are lengthened by what that
 //! may round off, so a search finds all within reach and may find some just beyond.
 
-use rayon::prelude::*;
+use crate::parallel::prelude::*;
 
 use crate::geometry::{Bounds, Point};
 

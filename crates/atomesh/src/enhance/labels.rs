@@ -6,7 +6,7 @@
 
 use std::collections::HashMap;
 
-use rayon::prelude::*;
+use crate::parallel::prelude::*;
 
 use crate::crests::FeaturePoint;
 use crate::geometry::{Point, dot};

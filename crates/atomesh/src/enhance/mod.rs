@@ -37,8 +37,8 @@ pub use thin::{CrestOptions, FaultOptions, HorizonOptions, Polarity};
 
 use crate::crests::FeaturePoint;
 use crate::image::{Grid, Image, Samples, Units};
+use crate::parallel::prelude::*;
 use crate::watch::{Cancelled, Phase, Watch, check};
-use rayon::prelude::*;
 use scale::UnitSamples;
 
 /// The narrowest Gaussian, in samples, whose derivative still sees the neighbours.

@@ -4,7 +4,7 @@
 //! the order of the numbers. One pass counts their upper halves, which finds that of the value wanted; a second counts
 //! the lower halves of the values with that upper half. Counts are integers, so that threads may add them in any order.
 
-use rayon::prelude::*;
+use crate::parallel::prelude::*;
 
 /// Samples read at once.
 const BLOCK: usize = 1 << 14;

@@ -4,8 +4,8 @@ use super::edges::edges;
 use super::quantile::{Levels, Order, Ranks};
 use super::{EnhanceError, Enhanced, FeatureOptions, Features};
 use crate::image::{Image, Samples, gaussian_between};
+use crate::parallel::prelude::*;
 use crate::watch::{Phase, Watch, check};
-use rayon::prelude::*;
 
 /// Of the samples darker (brighter) than the background, the share that is clipped to −1.
 const CLIPPED_FEATURES: f64 = 0.02;

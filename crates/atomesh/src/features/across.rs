@@ -1,6 +1,6 @@
 //! The facets across which what flows passes a feature: those between cells on its two sides.
 
-use rayon::prelude::*;
+use crate::parallel::prelude::*;
 
 use crate::crests::{Pieces, tangents};
 use crate::fields::NominalDistance;

@@ -4,7 +4,7 @@
 //! centres lie on its two sides: a sheet that ends only where the piece does. Else they are those along which |b| is
 //! large ([`feature_faces`]).
 
-use rayon::prelude::*;
+use crate::parallel::prelude::*;
 
 use super::across::{Between, across};
 use crate::crests::Pieces;

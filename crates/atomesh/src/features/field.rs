@@ -1,6 +1,6 @@
 //! b along facets.
 
-use rayon::prelude::*;
+use crate::parallel::prelude::*;
 
 use super::{FacetTest, FeaturesError, measure_and_mean};
 use crate::fields::ScalarField;

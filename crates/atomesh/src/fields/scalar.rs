@@ -1,6 +1,6 @@
 //! Scalar fields: samples on a grid, and what lies between them.
 
-use rayon::prelude::*;
+use crate::parallel::prelude::*;
 
 use crate::geometry::Point;
 use crate::image::Grid;

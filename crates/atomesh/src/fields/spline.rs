@@ -1,6 +1,6 @@
 //! The cubic B-spline through samples (Unser 1999), with mirrored ends (… 2 1 0 1 2 …).
 
-use rayon::prelude::*;
+use crate::parallel::prelude::*;
 
 use crate::geometry::Point;
 use crate::image::Grid;

@@ -1,7 +1,7 @@
 //! Points in blocks that are near each other: an order for searches by boxes.
 
 use super::{Bounds, Point};
-use rayon::prelude::*;
+use crate::parallel::prelude::*;
 
 /// The indices of `points` in an order in which any [`BLOCK`] that follow each other from a multiple of
 /// it on are near each other, and so are eight such blocks, and eight of those: the set is halved across

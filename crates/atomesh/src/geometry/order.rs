@@ -6,7 +6,7 @@
 //! Cost: O(n log n).
 
 use super::{Bounds, Point};
-use rayon::prelude::*;
+use crate::parallel::prelude::*;
 use std::cmp::Ordering;
 
 /// The bits of a whole key: 30 a coordinate in the plane, 20 in space.

@@ -7,7 +7,7 @@
 //! The nearest sample that is there is found exactly, axis after axis, by the lower envelope of parabolas (Felzenszwalb &
 //! Huttenlocher 2012). Cost: O(samples). Memory: two indices a sample while it is looked for.
 
-use rayon::prelude::*;
+use crate::parallel::prelude::*;
 
 use super::place::coordinates;
 use super::{FrameError, Image, Range};

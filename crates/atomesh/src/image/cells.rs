@@ -10,8 +10,8 @@
 
 use super::gaussian;
 use super::stream::{Run, Stream};
+use crate::parallel::prelude::*;
 use crate::watch::{Cancelled, Phase, Watch, check};
-use rayon::prelude::*;
 use std::ops::Range;
 
 /// Cells per standard deviation of the smoothing.

@@ -5,7 +5,7 @@
 //! Outside the image samples are mirrored about its edges, `d c b a | a b c d | d c b a`.
 
 use super::kernel::{Kernel, LANES};
-use rayon::prelude::*;
+use crate::parallel::prelude::*;
 
 /// Samples in a scratch block: 256 KiB, half of a small second-level cache.
 const BLOCK_SAMPLES: usize = 1 << 16;

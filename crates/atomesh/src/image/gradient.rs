@@ -4,8 +4,8 @@
 
 use super::stream::{Stencil, Stream};
 use super::{Grid, Samples};
+use crate::parallel::prelude::*;
 use crate::watch::Cancelled;
-use rayon::prelude::*;
 
 /// Samples between two looks at the watch: a fraction of a second's work.
 const BATCH_SAMPLES: usize = 1 << 25;

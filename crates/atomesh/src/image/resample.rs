@@ -1,6 +1,6 @@
 //! Images on the samples of another frame.
 
-use rayon::prelude::*;
+use crate::parallel::prelude::*;
 
 use super::place::coordinates;
 use super::{Frame, Image, Samples, Units};

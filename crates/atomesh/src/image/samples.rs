@@ -1,6 +1,6 @@
 //! Sample values in the type in which a file holds them.
 
-use rayon::prelude::*;
+use crate::parallel::prelude::*;
 
 use super::values::Values;
 use std::ops::Range as IndexRange;

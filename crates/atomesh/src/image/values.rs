@@ -4,7 +4,7 @@ use std::fmt;
 use std::ops::{Deref, DerefMut};
 use std::sync::Arc;
 
-use rayon::iter::{FromParallelIterator, IntoParallelIterator};
+use crate::parallel::{FromParallel, Parallel};
 
 /// Memory that is kept elsewhere, such as an array of another language's: the same values as long as it lives.
 pub type Elsewhere<T> = Arc<dyn AsRef<[T]> + Send + Sync>;
@@ -80,9 +80,9 @@ impl<T> FromIterator<T> for Values<T> {
     }
 }
 
-impl<T: Send> FromParallelIterator<T> for Values<T> {
-    fn from_par_iter<I: IntoParallelIterator<Item = T>>(values: I) -> Self {
-        Vec::from_par_iter(values).into()
+impl<T: Send> FromParallel<T> for Values<T> {
+    fn from_parallel(values: impl Parallel<Item = T>) -> Self {
+        Vec::from_parallel(values).into()
     }
 }
 

@@ -1,6 +1,6 @@
 //! Filling the holes of a lattice where something was changed, and only there.
 
-use rayon::prelude::*;
+use crate::parallel::prelude::*;
 
 use crate::fields::NominalDistance;
 use crate::geometry::{Bounds, Point, PointGrid, all_axes, distance_squared};

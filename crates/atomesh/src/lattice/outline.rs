@@ -1,6 +1,6 @@
 //! Putting atoms back onto the outline of a mask after they have moved. Cost: O(atoms). Deterministic.
 
-use rayon::prelude::*;
+use crate::parallel::prelude::*;
 
 use crate::fields::NominalDistance;
 use crate::geometry::{Point, all_axes, axes_where, difference, dot};

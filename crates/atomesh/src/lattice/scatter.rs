@@ -8,9 +8,9 @@
 //! largest r/d down, every circumcentre far enough from those before it. The end is the same, and so is
 //! the order within a round; the cost is that of a few meshes instead of an insertion at a time.
 
+use crate::parallel::prelude::*;
 use rand::{RngExt, SeedableRng};
 use rand_pcg::Pcg64;
-use rayon::prelude::*;
 
 use crate::fields::NominalDistance;
 use crate::geometry::linear::solve;

@@ -5,7 +5,7 @@
 //! it is small, so that a graded lattice stays graded. Atoms that the box or a temperature holds stay. A
 //! few sweeps over one mesh do most of what there is to gain. Cost: O(atoms) a sweep, and one mesh.
 
-use rayon::prelude::*;
+use crate::parallel::prelude::*;
 
 use super::{Lattice, LatticeError, Scatterer};
 use crate::fields::NominalDistance;

@@ -7,9 +7,9 @@ use super::precision::PrecisionReport;
 use super::statistics::{percentile, sum};
 use crate::crests::FeaturePoint;
 use crate::mesh::{Mesh, PolyMesh};
+use crate::parallel::prelude::*;
 use crate::watch::{Phase, Watch, check};
 use rand::{Rng, SeedableRng};
-use rayon::prelude::*;
 
 /// Feature points between two looks at the watch: a few hundredths of a second.
 const POINTS_PER_STEP: usize = 1 << 13;

@@ -8,8 +8,8 @@ use super::statistics::{Histogram, sum};
 use crate::geometry::linear::invert;
 use crate::geometry::{Point, difference, distance_squared, dot};
 use crate::mesh::Mesh;
+use crate::parallel::prelude::*;
 use crate::watch::{Phase, Watch, check};
-use rayon::prelude::*;
 
 /// The width of the bins of angles, in degrees, and of edges, in d.
 const ANGLE_WIDTH: f64 = 5.0;

@@ -4,7 +4,7 @@
 //! feature are known, and so is the feature: a piece of crest between samples ([`Pieces`]). So what is asked is how far
 //! the facets are from their own crest, which places on it have no facet, and which cells it still cuts.
 
-use rayon::prelude::*;
+use crate::parallel::prelude::*;
 
 use super::statistics::{sum, sums};
 use crate::conform::{FeatureFacet, Unmet, cut_cells, unmet};

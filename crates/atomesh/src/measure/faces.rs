@@ -1,7 +1,7 @@
 //! The distinct edges and facets of a mesh.
 
 use crate::mesh::Mesh;
-use rayon::prelude::*;
+use crate::parallel::prelude::*;
 use std::ops::Range;
 
 /// The most points whose faces are sought at once, which limits how many faces are held twice.

@@ -7,7 +7,7 @@ use super::faces::faces;
 use crate::geometry::linear::solve;
 use crate::geometry::{Bounds, Point, difference, dot};
 use crate::mesh::Mesh;
-use rayon::prelude::*;
+use crate::parallel::prelude::*;
 
 /// The most facets of a leaf.
 const LEAF: usize = 4;

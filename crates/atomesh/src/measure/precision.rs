@@ -12,8 +12,8 @@ use super::statistics::sums;
 use crate::crests::FeaturePoint;
 use crate::geometry::{Point, difference, dot};
 use crate::mesh::Mesh;
+use crate::parallel::prelude::*;
 use crate::watch::{Phase, Watch, check};
-use rayon::prelude::*;
 
 /// The mean of b along a facet at or below which it is selected, as for picking faults.
 const FACET_THRESHOLD: f64 = -0.2;

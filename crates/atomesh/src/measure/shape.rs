@@ -6,8 +6,8 @@ use super::faces::faces;
 use super::statistics::{Histogram, least, percentile, sum, sums};
 use crate::geometry::{Bounds, difference, dot};
 use crate::mesh::Mesh;
+use crate::parallel::prelude::*;
 use crate::watch::{Phase, Watch, check};
-use rayon::prelude::*;
 
 /// The greatest measure of a flat cell, over the median.
 const FLAT: f64 = 1e-9;

@@ -1,6 +1,6 @@
 //! Means, percentiles and histograms, summed in a fixed order.
 
-use rayon::prelude::*;
+use crate::parallel::prelude::*;
 use std::ops::Range;
 
 /// Up to this many values are summed one after another.

@@ -12,7 +12,7 @@
 
 use std::collections::HashMap;
 
-use rayon::prelude::*;
+use crate::parallel::prelude::*;
 
 use crate::geometry::{Point, Simplex};
 use crate::watch::Silent;
@@ -80,7 +80,7 @@ impl<const D: usize> Cells<D> {
     }
 
     /// [`Self::all`], on all threads.
-    pub fn par_all(&self) -> impl ParallelIterator<Item = &[u32]> {
+    pub fn par_all(&self) -> impl Parallel<Item = &[u32]> {
         let cells = self.corners.par_chunks_exact(Self::CORNERS).zip(&self.is_cell);
         cells.filter(|(_, is_cell)| **is_cell).map(|(corners, _)| corners)
     }

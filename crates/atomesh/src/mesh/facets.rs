@@ -2,7 +2,7 @@
 
 use std::ops::Range;
 
-use rayon::prelude::*;
+use crate::parallel::prelude::*;
 
 use super::Mesh;
 use crate::geometry::{Point, difference};
@@ -50,7 +50,7 @@ impl<const D: usize> Mesh<D> {
     fn blocks<T: Send>(
         &self,
         of_block: impl Fn(Range<u32>, &CellsOfPoints) -> Option<T> + Sync + Send,
-    ) -> impl ParallelIterator<Item = T> {
+    ) -> impl Parallel<Item = T> {
         let cells = self.cells_of_points();
         let count = self.points.len();
         let blocks = (0..count.div_ceil(BLOCK)).into_par_iter().map(|block| block * BLOCK);

@@ -11,6 +11,7 @@ mod tags;
 mod validate;
 
 use crate::geometry::{Point, Simplex};
+use crate::parallel::prelude::*;
 #[cfg(test)]
 pub(crate) use cell_changes::sort_by_swaps;
 pub(crate) use cell_changes::{CellChanges, in_order};
@@ -25,7 +26,6 @@ pub use poly_mesh::{
     boundary_connections, connections,
 };
 pub use quadratic::Quadratic;
-use rayon::prelude::*;
 pub use tags::{
     FacetGroup, MASK_NAME, PointGroup, Regions, Tags, TagsError, feature_name, interface_name,
     is_feature_name, region_name, side_name, well_name,

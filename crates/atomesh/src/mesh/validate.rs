@@ -1,6 +1,6 @@
 //! What a mesh promises, checked by exact arithmetic.
 
-use rayon::prelude::*;
+use crate::parallel::prelude::*;
 
 use super::Mesh;
 use super::facets::HalfFacet;

@@ -1,6 +1,6 @@
 //! Vector operations over fixed blocks: parallel, and the same to the last bit at any thread count.
 
-use rayon::prelude::*;
+use crate::parallel::prelude::*;
 
 /// Variables a block; a block's sum is taken in order, and so is the sum of the blocks.
 const BLOCK: usize = 8192;

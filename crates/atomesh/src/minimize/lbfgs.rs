@@ -283,7 +283,7 @@ impl Lbfgs {
 
 /// `out = a − b`, taken in double precision and then rounded.
 fn store_difference(out: &mut [f32], a: &[f64], b: &[f64]) {
-    use rayon::prelude::*;
+    use crate::parallel::prelude::*;
     out.par_chunks_mut(8192).zip(a.par_chunks(8192).zip(b.par_chunks(8192))).for_each(
         |(out, (a, b))| {
             for (o, (a, b)) in out.iter_mut().zip(a.iter().zip(b)) {

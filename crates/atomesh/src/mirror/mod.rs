@@ -19,7 +19,7 @@
 mod exclusion;
 mod pairs;
 
-use rayon::prelude::*;
+use crate::parallel::prelude::*;
 
 use crate::crests::{FeaturePoint, sites};
 use crate::fields::{FieldsView, ImageWeight};

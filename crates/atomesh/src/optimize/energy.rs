@@ -1,6 +1,6 @@
 //! The lattice's energy as a function of free variables.
 
-use rayon::prelude::*;
+use crate::parallel::prelude::*;
 
 use crate::energy::{Energy, Engine};
 use crate::geometry::{Bounds, Point};

@@ -3,7 +3,7 @@
 //! `sample` says which label a cell has; here is what follows from labels: the interfaces between two of them, and the
 //! closed surface of one.
 
-use rayon::prelude::*;
+use crate::parallel::prelude::*;
 
 use crate::image::Samples;
 use crate::mesh::{Facet, Mesh};

@@ -6,7 +6,7 @@
 //! outside go, and those with all corners on the outline stay if their centroid is inside. Last, cells are dropped
 //! until the boundary is a manifold ([`super::manifold`]). Cost: O(cells).
 
-use rayon::prelude::*;
+use crate::parallel::prelude::*;
 
 use crate::geometry::{Bounds, Point, distance_squared};
 use crate::mesh::Mesh;

@@ -1,6 +1,6 @@
 //! What a run will take, before it starts.
 
-use rayon::prelude::*;
+use crate::parallel::prelude::*;
 
 use crate::enhance::{EdgeOperator, FeatureOptions, Features, Mixture};
 use crate::fields::{Interpolation, NominalDistance, ScalarField};

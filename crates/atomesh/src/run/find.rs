@@ -1,6 +1,6 @@
 //! The features of an image that facets are to keep to.
 
-use rayon::prelude::*;
+use crate::parallel::prelude::*;
 
 use crate::crests::{
     Cleanness, FeaturePoint, Hysteresis, Pieces, in_large_groups, linked, strongest,

@@ -2,7 +2,7 @@
 
 use std::collections::BTreeSet;
 
-use rayon::prelude::*;
+use crate::parallel::prelude::*;
 
 use crate::conform::{FeatureFacet, Unmet, feature_facets, unmet};
 use crate::features::{

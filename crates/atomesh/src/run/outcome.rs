@@ -2,7 +2,7 @@
 
 use std::collections::HashSet;
 
-use rayon::prelude::*;
+use crate::parallel::prelude::*;
 
 use crate::conform::FeatureFacet;
 use crate::features::{

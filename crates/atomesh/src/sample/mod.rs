@@ -20,11 +20,11 @@ mod tests;
 
 use crate::geometry::Point;
 use crate::image::{Frame, Image, Samples, Units};
+use crate::parallel::prelude::*;
 use crate::watch::{Cancelled, Phase, Watch, check};
 pub use cells::CellSurfaces;
 pub(crate) use clip::Axis;
 use overlap::{Overlaps, Surface};
-use rayon::prelude::*;
 use statistic::Tally;
 pub use statistic::{Statistic, UnknownStatistic};
 

@@ -3,7 +3,7 @@
 use super::random::Random;
 use super::{Shade, SynthError, SynthOptions};
 use crate::image::{Grid, Samples, coordinates, gaussian};
-use rayon::prelude::*;
+use crate::parallel::prelude::*;
 
 /// Samples drawn by one task; even, since noise comes in pairs.
 const BLOCK: usize = 4096;

@@ -3,7 +3,7 @@
 //! A face between two cells (3-D), or a cell (2-D), is the loop of the circumcentres of the Delaunay cells around an edge,
 //! or around a site.
 
-use rayon::prelude::*;
+use crate::parallel::prelude::*;
 
 use super::VoronoiError;
 use crate::geometry::linear::solve;

@@ -1,6 +1,6 @@
 //! Merging the ends of short edges, and numbering points and faces.
 
-use rayon::prelude::*;
+use crate::parallel::prelude::*;
 
 use super::clip::{Cut, of_side, side_of};
 use super::dual::{Domain, NONE};

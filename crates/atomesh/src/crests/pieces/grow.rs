@@ -2,7 +2,7 @@
 
 use std::collections::VecDeque;
 
-use rayon::prelude::*;
+use crate::parallel::prelude::*;
 
 use super::super::FeaturePoint;
 use super::link::{Alike, Around, linked_pairs};

@@ -2,7 +2,7 @@
 
 use std::collections::VecDeque;
 
-use rayon::prelude::*;
+use crate::parallel::prelude::*;
 
 use super::super::FeaturePoint;
 use super::grow::{add_rest, layered};

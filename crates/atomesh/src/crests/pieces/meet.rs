@@ -2,7 +2,7 @@
 
 use std::collections::HashSet;
 
-use rayon::prelude::*;
+use crate::parallel::prelude::*;
 
 use super::super::FeaturePoint;
 use super::grow::{EXPLAINED, EXPLAINED_ALONG};

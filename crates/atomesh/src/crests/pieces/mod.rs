@@ -16,7 +16,7 @@ mod near;
 mod patch;
 mod support;
 
-use rayon::prelude::*;
+use crate::parallel::prelude::*;
 
 use super::FeaturePoint;
 use crate::geometry::{Bounds, Point, PointGrid, Sets, difference, distance_squared, dot};

@@ -1,6 +1,6 @@
 //! Which points lie on one feature alone: those most of whose neighbours lie on their planes.
 
-use rayon::prelude::*;
+use crate::parallel::prelude::*;
 
 use super::super::FeaturePoint;
 use super::Cleanness;
@@ -59,9 +59,10 @@ pub(super) fn cleanness<const D: usize>(points: &[FeaturePoint<D>], grid: &Grid<
     let support = Support::new(points, &grid.bounds(), step, NEXT);
     let share = |asked: usize, is: &(dyn Fn(usize) -> bool + Sync)| {
         let stride = (points.len() / asked).max(1);
-        let all = (0..points.len().div_ceil(stride)).into_par_iter().with_min_len(1 << 6);
-        let count = all.clone().filter(|&i| is(i * stride)).count();
-        count as f64 / all.len().max(1) as f64
+        let all = points.len().div_ceil(stride);
+        let numbers = (0..all).into_par_iter().with_min_len(1 << 6);
+        let count = numbers.filter(|&i| is(i * stride)).count();
+        count as f64 / all.max(1) as f64
     };
     let clean = share(ASKED, &|i| support.of(i));
     let unexplained = share(ASKED_FURTHER, &|i| !support.of(i) && !support.is_explained(i));

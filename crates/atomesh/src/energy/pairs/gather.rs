@@ -1,6 +1,6 @@
 //! Energy and gradient of all atoms, from their lists: chunk by chunk, each atom gathering its own sum.
 
-use rayon::prelude::*;
+use crate::parallel::prelude::*;
 
 use crate::fields::HeldCell;
 use crate::geometry::Point;

@@ -12,7 +12,7 @@ mod gather;
 #[cfg(test)]
 mod tests;
 
-use rayon::prelude::*;
+use crate::parallel::prelude::*;
 
 use crate::fields::{FieldsView, HeldCell};
 use crate::geometry::{Bounds, Point, compact_order, distance_squared};

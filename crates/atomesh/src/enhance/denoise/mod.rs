@@ -24,7 +24,7 @@ mod tests;
 
 pub use noise::noise_level;
 
-use rayon::prelude::*;
+use crate::parallel::prelude::*;
 use serde::{Deserialize, Serialize};
 
 use crate::image::Grid;

@@ -1,6 +1,6 @@
 //! The level of an image's noise.
 
-use rayon::prelude::*;
+use crate::parallel::prelude::*;
 
 use crate::image::Grid;
 
@@ -49,7 +49,10 @@ pub fn noise_level<const D: usize>(values: &[f32], grid: &Grid<D>) -> f64 {
     while common_divisor(step, shape[0]) > 1 {
         step += 1;
     }
-    let indices = (0..values.len()).into_par_iter().step_by(step).filter(|&index| is_inside(index));
+    let indices = (0..values.len().div_ceil(step))
+        .into_par_iter()
+        .map(|at| at * step)
+        .filter(|&index| is_inside(index));
     let mut sizes: Vec<f32> = indices
         .map(|index| {
             let value = |tap: &Tap| f64::from(values[index.wrapping_add_signed(tap.offset)]);

@@ -9,8 +9,8 @@
 use crate::crests::FeaturePoint;
 use crate::enhance::quantile::{Order, Ranks};
 use crate::image::{Grid, Run, Stencil, Stream, coordinates};
+use crate::parallel::prelude::*;
 use crate::watch::{Cancelled, Phase, Watch, check};
-use rayon::prelude::*;
 use std::collections::VecDeque;
 use std::ops::Range;
 

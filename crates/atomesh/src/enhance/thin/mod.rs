@@ -25,12 +25,12 @@ pub use options::{CrestOptions, Polarity};
 use super::{EnhanceError, Enhanced, FeatureOptions, Features, to_lattice};
 use crate::crests::{FeaturePoint, Hysteresis, linked, widen};
 use crate::image::{Grid, Image, Samples};
+use crate::parallel::prelude::*;
 use crate::watch::{Phase, Watch, check};
 use edges::Edges;
 use faults::Faults;
 use horizons::Horizons;
 use options::Thresholds;
-use rayon::prelude::*;
 use ridges::Ridges;
 pub(super) use ridges::valleys;
 

@@ -1,7 +1,7 @@
 //! Values on the scale 0…1.
 
 use crate::enhance::quantile::{Order, Ranks};
-use rayon::prelude::*;
+use crate::parallel::prelude::*;
 
 /// An image's values, moved and scaled to 0…1 while they are read.
 #[derive(Clone, Copy)]

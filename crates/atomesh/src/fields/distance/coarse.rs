@@ -1,7 +1,7 @@
 //! Bringing samples to a coarser grid over the same box.
 
 use crate::image::Grid;
-use rayon::prelude::*;
+use crate::parallel::prelude::*;
 
 /// What a node takes from the samples around it, up to the next nodes.
 #[derive(Clone, Copy, Debug, PartialEq)]

@@ -14,7 +14,7 @@ use super::{
     check_step,
 };
 use crate::image::{Grid, gaussian, gaussian_derivative};
-use rayon::prelude::*;
+use crate::parallel::prelude::*;
 use serde::{Deserialize, Serialize};
 
 /// The share of the image, where features are densest, that gets the least distance of a grading.

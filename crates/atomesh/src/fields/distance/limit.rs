@@ -12,7 +12,7 @@
 
 use std::sync::atomic::{AtomicBool, AtomicU32, Ordering::Relaxed};
 
-use rayon::prelude::*;
+use crate::parallel::prelude::*;
 
 /// Rounds of sweeps; each carries values across the grid, so that few are needed.
 const ROUNDS: usize = 64;

@@ -13,9 +13,9 @@ mod limit;
 use super::{Interpolation, ScalarField};
 use crate::geometry::{Bounds, Point};
 use crate::image::Grid;
+use crate::parallel::prelude::*;
 use coarse::{Take, coarse_grid, reduce};
 use limit::limit_gradient;
-use rayon::prelude::*;
 
 pub use default::default_distance;
 pub use grading::{GradeBy, Grading, feature_density};

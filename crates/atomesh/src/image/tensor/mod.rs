@@ -21,9 +21,9 @@ use super::cells::{CellAverages, CellRow, Entries, between};
 use super::stream::{Stencil, Stream};
 use super::{Grid, coordinates};
 use crate::geometry::linear::Matrix;
+use crate::parallel::prelude::*;
 use crate::watch::{Cancelled, Watch};
 use normal::normal;
-use rayon::prelude::*;
 
 /// Outer products of Gaussian gradients, smoothed: its leading eigenvector is the normal of layers and sheets.
 ///

@@ -5,7 +5,7 @@
 //! outline does not change, so its guides are shared out again among its cells. Points without a common cell do not
 //! affect each other: they are tried in parallel, by colours, with the same result at any thread count.
 
-use rayon::prelude::*;
+use crate::parallel::prelude::*;
 
 use crate::fields::NominalDistance;
 use crate::geometry::{Point, difference, distance_squared, dot};

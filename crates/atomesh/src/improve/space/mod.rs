@@ -33,11 +33,11 @@ use super::{Align, Held, ImproveError, ImproveOptions, ImproveReport, Improver};
 use crate::fields::FieldsView;
 use crate::geometry::{Bounds, Point};
 use crate::mesh::Mesh;
+use crate::parallel::prelude::*;
 use crate::watch::{Phase, Watch, check};
 use align::Aligner;
 use depth::DepthField;
 use parts::{CUTS, Part, WholeMesh};
-use rayon::prelude::*;
 use slivers::{Effort, remove_slivers};
 
 /// Improves tetrahedra.

@@ -8,7 +8,7 @@
 use super::shape::shape;
 use super::tetrahedra::{NONE, Tetrahedra};
 use crate::geometry::{Bounds, Point};
-use rayon::prelude::*;
+use crate::parallel::prelude::*;
 use std::collections::HashSet;
 
 /// The points of a part, about: enough that few are held, few enough for all cores and for a cache. Tests cut small meshes too.

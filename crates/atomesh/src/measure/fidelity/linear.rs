@@ -7,7 +7,7 @@
 //!
 //! The sum of the cells' equations is solved by conjugate gradients, scaled by the diagonal.
 
-use rayon::prelude::*;
+use crate::parallel::prelude::*;
 
 use super::PlacedMesh;
 use crate::geometry::linear::invert;

@@ -14,9 +14,9 @@ use crate::geometry::Point;
 use crate::measure::MeasureError;
 use crate::measure::faces::faces;
 use crate::measure::statistics::{sum, sums};
+use crate::parallel::prelude::*;
 use crate::sample::Axis;
 use crate::watch::{Phase, Watch, check};
-use rayon::prelude::*;
 
 /// Planes of samples between two looks at the watch.
 const PLANES_PER_STEP: usize = 64;

@@ -5,7 +5,7 @@
 //! 2. Within a block the cells are counted by their lowest corner, and those that share it sorted.
 
 use crate::geometry::shares;
-use rayon::prelude::*;
+use crate::parallel::prelude::*;
 use std::ops::Range;
 
 /// Points whose cells make one block.

@@ -22,9 +22,9 @@ use super::{Mesh, MeshError};
 use crate::geometry::Point;
 use crate::watch::{Cancelled, Phase, Watch, check};
 
+use crate::parallel::prelude::*;
 use prepare::Prepared;
 pub use prepare::merge_duplicates;
-use rayon::prelude::*;
 
 /// Why points were not connected.
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]

@@ -2,7 +2,7 @@
 
 use super::{ConnectError, MOST_POINTS};
 use crate::geometry::{Point, hilbert_order, lexicographic};
-use rayon::prelude::*;
+use crate::parallel::prelude::*;
 use std::cmp::Ordering;
 
 /// Products of five coordinates of this magnitude, and their rounding errors, do not underflow.
@@ -29,7 +29,8 @@ impl<const D: usize> Prepared<D> {
         let scaled = scale(points)?;
         let order = hilbert_order(&scaled);
         let points: Vec<Point<D>> = order.par_iter().map(|&i| scaled[i as usize]).collect();
-        let equal_pair = points.par_windows(2).position_first(|pair| equal(&pair[0], &pair[1]));
+        let pairs = points.par_iter().zip(&points[1..]);
+        let equal_pair = pairs.position_first(|(one, next)| equal(one, next));
         if let Some(at) = equal_pair {
             let pair = [order[at] as usize, order[at + 1] as usize];
             return Err(ConnectError::Duplicate { first: pair[0], second: pair[1] });

@@ -1,6 +1,6 @@
 //! Which cells are connected, and by what: the geometry that two-point flow needs.
 
-use rayon::prelude::*;
+use crate::parallel::prelude::*;
 
 use super::PolyMesh;
 use crate::geometry::{Point, difference, dot};

@@ -10,7 +10,7 @@ mod validate;
 
 use std::ops::Range;
 
-use rayon::prelude::*;
+use crate::parallel::prelude::*;
 
 use super::compensated_sum;
 use crate::geometry::{Bounds, Point};

@@ -1,6 +1,6 @@
 //! Measures, centroids and normals of cells and faces.
 
-use rayon::prelude::*;
+use crate::parallel::prelude::*;
 
 use super::{BLOCK, PolyMesh};
 use crate::geometry::{Point, Simplex, dot};

@@ -1,6 +1,6 @@
 //! What a mesh of polygons or polyhedra promises, checked.
 
-use rayon::prelude::*;
+use crate::parallel::prelude::*;
 
 use super::{PolyMesh, PolyParts, mean_distance};
 use crate::geometry::{Bounds, Point, difference, dot};

@@ -6,7 +6,7 @@
 //! linear between nodes.
 
 use super::facing::volume;
-use rayon::prelude::*;
+use crate::parallel::prelude::*;
 
 /// Samples between nodes; windows reach to the next nodes.
 const STEP: usize = 32;

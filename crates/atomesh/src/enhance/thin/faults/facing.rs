@@ -1,7 +1,7 @@
 //! Planes of an image that are scanned for faults which face x, or y.
 
+use crate::parallel::prelude::*;
 use crate::watch::{Cancelled, Phase, Watch, check};
-use rayon::prelude::*;
 
 /// Which horizontal axis the faults face, within 45°, and how the samples are ordered for their scan.
 ///

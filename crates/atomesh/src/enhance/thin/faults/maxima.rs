@@ -5,7 +5,7 @@ use super::facing::volume;
 use super::scan::{Found, Orientation};
 use crate::crests::FeaturePoint;
 use crate::image::Grid;
-use rayon::prelude::*;
+use crate::parallel::prelude::*;
 
 /// The power of semblance in the likelihood, Hale's.
 const POWER: i32 = 8;

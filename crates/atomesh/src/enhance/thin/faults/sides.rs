@@ -8,8 +8,8 @@
 use super::FaultOptions;
 use super::facing::{Facing, in_order};
 use crate::image::gaussian;
+use crate::parallel::prelude::*;
 use crate::watch::{Cancelled, Watch};
-use rayon::prelude::*;
 
 /// Samples of one task.
 const BLOCK: usize = 1 << 16;

@@ -1,8 +1,8 @@
 //! The slopes of layers: by how many samples they go down for one sample along x, and along y.
 
 use crate::image::{Grid, StructureTensor};
+use crate::parallel::prelude::*;
 use crate::watch::{Cancelled, Watch};
-use rayon::prelude::*;
 
 /// Standard deviation, in samples, of the Gaussian whose derivatives are taken: white noise passes, but is the
 /// same in all directions and turns no normal, while a wider one would blur the jumps at faults.

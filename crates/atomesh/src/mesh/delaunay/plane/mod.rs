@@ -9,8 +9,8 @@ mod ties;
 use super::prepare::Prepared;
 use super::{STRIDE, canonical, rounds};
 use crate::geometry::Simplex;
+use crate::parallel::prelude::*;
 use crate::watch::{Cancelled, Phase, Watch, check};
-use rayon::prelude::*;
 use spade::handles::FixedUndirectedEdgeHandle;
 use spade::{DelaunayTriangulation, Point2, Triangulation};
 

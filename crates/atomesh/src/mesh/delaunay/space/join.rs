@@ -17,8 +17,8 @@ use super::part::Part;
 use super::storage::{FACETS, INFINITE, Mark};
 use super::{STRIDE, Triangulation, rounds};
 use crate::geometry::Bounds;
+use crate::parallel::prelude::*;
 use crate::watch::{Cancelled, Phase, Watch, check};
-use rayon::prelude::*;
 
 /// A facet on the border between final cells of other parts and the rest.
 struct Border {
@@ -39,7 +39,8 @@ pub(super) fn join(
         return Ok(parts.into_iter().map(|part| part.triangulation).collect());
     }
     let boxes: Vec<Bounds<3>> = parts.iter().map(|part| part.bounds).collect();
-    parts.par_iter_mut().enumerate().skip(1).for_each(|(index, part)| {
+    parts[1..].par_iter_mut().enumerate().for_each(|(before, part)| {
+        let index = before + 1;
         let others: Vec<Bounds<3>> = boxes
             .iter()
             .enumerate()

@@ -36,11 +36,11 @@ mod tests;
 
 use super::prepare::Prepared;
 use super::{STRIDE, canonical, rounds};
+use crate::parallel::prelude::*;
 use crate::watch::{Cancelled, Watch};
 use fill::Rim;
 use part::Part;
 use predicates::Predicates;
-use rayon::prelude::*;
 use storage::{Mark, Tetrahedra, Vertex};
 
 /// Least number of points in a part: smaller parts would be mostly seam.

@@ -1,7 +1,7 @@
 //! Dividing points into parts by planes.
 
 use crate::geometry::{Bounds, Point};
-use rayon::prelude::*;
+use crate::parallel::prelude::*;
 
 /// A plane is put at the median of about this many points.
 const SAMPLE: usize = 1 << 14;
