@@ -70,7 +70,8 @@ pub(crate) fn world_axes(wish: Option<ZPositive>, made_by: Option<&Provenance>) 
         Some(wish) => wish == ZPositive::Depth,
         None => is_time || is_vertical().is_some(),
     };
-    WorldAxes { units, z_down }
+    let standing = made_by.and_then(|made| made.standing);
+    WorldAxes { units, z_down, standing }
 }
 
 /// What became of [`surfaces_file`].

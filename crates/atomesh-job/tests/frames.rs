@@ -4,7 +4,7 @@ use std::path::{Path, PathBuf};
 
 use atomesh::image::{Frame, Image, Samples, Units};
 use atomesh::watch::Silent;
-use atomesh_io::image::{AnyImage, LoadedImage, write_image};
+use atomesh_io::image::{AnyImage, write_image};
 use atomesh_job::mesh::{MeshImages, ShownImage};
 use atomesh_job::options::{InputOptions, RunConfig};
 use atomesh_job::{Dimension, ErrorKind, JobError, Session};
@@ -63,9 +63,9 @@ impl Case {
         let mut watch = Silent;
         let mut session = Session::new(&mut watch);
         let image = atomesh_job::mesh::read_shown(&run, &mut session)?;
-        let LoadedImage { image, units, .. } = image;
-        let AnyImage::Volume(image) = image else { panic!() };
-        let image = ShownImage { image, units };
+        let world = image.world();
+        let AnyImage::Volume(image) = image.image else { panic!() };
+        let image = ShownImage { image, world };
         let images = MeshImages::read_fields(&run, image, &Dimension::space(), &mut session)?;
         let notes = session.notes().iter().map(ToString::to_string).collect();
         Ok((images.labels.unwrap(), notes))

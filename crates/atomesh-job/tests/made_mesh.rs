@@ -4,7 +4,7 @@ use std::path::PathBuf;
 
 use atomesh::image::{Frame, Image, Samples};
 use atomesh::watch::Silent;
-use atomesh_io::mesh::AnyMesh;
+use atomesh_io::mesh::{AnyMesh, World};
 use atomesh_job::mesh::{GivenField, GivenFields, MadeMesh, MeshImages, meshed, prepare};
 use atomesh_job::mesh_file::{MeshFile, read};
 use atomesh_job::options::{LatticeOptions, OutputOptions, RunConfig};
@@ -44,7 +44,7 @@ fn a_made_mesh_is_looked_at_as_its_file_is_read() {
         let (prepared, image) =
             prepare(&run, MeshImages::new(image()), &plane, &mut session).unwrap();
         let outcome = meshed(&run, prepared, &mut session).unwrap();
-        let units = ["mm".to_owned(), "mm".to_owned()];
+        let world = World { units: vec!["mm".into(); 2], standing: None };
         let values = (0..outcome.cells().map_or(outcome.mesh().cell_count(), |c| c.cell_count()))
             .map(|cell| cell as f64 + 0.5)
             .collect();
@@ -53,7 +53,7 @@ fn a_made_mesh_is_looked_at_as_its_file_is_read() {
             run: &run,
             outcome: &outcome,
             image: Some(&image),
-            units: &units,
+            world: &world,
             properties: &properties,
         };
         made.write(&plane, &mut session).unwrap();
@@ -86,7 +86,13 @@ fn without_an_image_pictures_and_reports_are_refused() {
     let (prepared, _) = prepare(&run, MeshImages::new(image()), &plane, &mut session).unwrap();
     let outcome = meshed(&run, prepared, &mut session).unwrap();
     run.output.picture = Some(folder.path().join("m.png"));
-    let made = MadeMesh { run: &run, outcome: &outcome, image: None, units: &[], properties: &[] };
+    let made = MadeMesh {
+        run: &run,
+        outcome: &outcome,
+        image: None,
+        world: &World::default(),
+        properties: &[],
+    };
     assert!(made.report(&plane, &mut session).is_err());
     let refused = made.write(&plane, &mut session).unwrap_err();
     assert!(refused.to_string().contains("need the image"), "{refused}");

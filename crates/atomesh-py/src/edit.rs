@@ -8,6 +8,7 @@ use atomesh::lattice::Lattice;
 use atomesh::mesh::ConnectError;
 use atomesh::optimize::{OptimizeError, OptimizeOptions};
 use atomesh::run::{Method, Prepared};
+use atomesh_io::mesh::World;
 use atomesh_job::mesh::refusal;
 use atomesh_job::options::RunConfig;
 use atomesh_job::{Dimension, JobError, Session};
@@ -67,7 +68,7 @@ struct Held<const D: usize> {
     prepared: Prepared<D>,
     run: RunConfig,
     image: CoreImage<D>,
-    units: Vec<String>,
+    world: World,
     dimension: Dimension<D>,
 }
 
@@ -82,7 +83,7 @@ pub fn editor<const D: usize>(
     dimension: Dimension<D>,
     session: &mut Session<'_>,
 ) -> Result<Box<dyn EditorBody>, JobError> {
-    let Made { run, outcome, units, .. } = made;
+    let Made { run, outcome, world, .. } = made;
     let prepared = outcome.run().clone();
     if prepared.outline().is_some() {
         let message =
@@ -100,7 +101,7 @@ pub fn editor<const D: usize>(
         prepared,
         run: run.clone(),
         image,
-        units: units.clone(),
+        world: world.clone(),
         dimension,
     }))
 }
@@ -193,7 +194,7 @@ impl<const D: usize> EditorBody for Held<D> {
     }
 
     fn mesh(&self, session: &mut Session<'_>) -> Result<Box<dyn Body>, JobError> {
-        let Self { prepared, run, image, units, .. } = self;
+        let Self { prepared, run, image, world, .. } = self;
         let outcome = (|| {
             let settled = prepared.with_settled(self.editor.lattice())?;
             match run.is_voronoi() {
@@ -202,8 +203,8 @@ impl<const D: usize> EditorBody for Held<D> {
             }
         })();
         let outcome = outcome.map_err(|e| refusal(run, e))?;
-        let (run, image, units) = (run.clone(), image.clone(), units.clone());
-        Made { run, outcome, image, units }.into_body(self.dimension.clone())
+        let (run, image, world) = (run.clone(), image.clone(), world.clone());
+        Made { run, outcome, image, world }.into_body(self.dimension.clone())
     }
 }
 

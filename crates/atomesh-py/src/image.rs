@@ -4,7 +4,8 @@ use std::path::PathBuf;
 use std::sync::Arc;
 
 use atomesh::image::{Frame, FrameError, Samples, Units};
-use atomesh_io::image::{AnyImage, LoadedImage, Meaning};
+use atomesh_io::image::{AnyImage, Meaning};
+use atomesh_io::mesh::World;
 use atomesh_job::mesh::{MeshImages, prepare};
 use atomesh_job::options::RunConfig;
 use atomesh_job::{Dimension, JobError, Session};
@@ -44,14 +45,14 @@ use crate::work::work;
 #[pyclass(frozen, module = "atomesh")]
 pub struct Image {
     any: Arc<AnyImage>,
-    units: Vec<String>,
+    world: World,
     notes: Vec<String>,
 }
 
 impl Image {
     /// An image as read or made.
-    pub fn new(any: AnyImage, units: Vec<String>, notes: Vec<String>) -> Self {
-        Self { any: Arc::new(any), units, notes }
+    pub fn new(any: AnyImage, world: World, notes: Vec<String>) -> Self {
+        Self { any: Arc::new(any), world, notes }
     }
 
     /// The image of either dimension.
@@ -59,9 +60,9 @@ impl Image {
         &self.any
     }
 
-    /// The units of the world's axes.
-    pub fn units(&self) -> &[String] {
-        &self.units
+    /// What is known of the world beside the frame.
+    pub fn world(&self) -> &World {
+        &self.world
     }
 
     /// An image itself, the image in a file, or that of another package's object.
@@ -144,7 +145,7 @@ impl Image {
             let message = format!("{} units; expected {}, x first", units.len(), shape.len());
             return Err(errors::input(py, message));
         }
-        Ok(Self::new(any, units, Vec::new()))
+        Ok(Self::new(any, World { units, standing: None }, Vec::new()))
     }
 
     /// The image of another package's object: SimpleITK.Image, itk.Image, a nibabel image, pyvista.ImageData, an
@@ -214,7 +215,7 @@ impl Image {
     #[getter]
     #[pyo3(name = "units")]
     fn units_list(&self) -> Vec<String> {
-        self.units.clone()
+        self.world.units.clone()
     }
 
     /// What the reader took for granted, changed or left out.
@@ -362,17 +363,17 @@ pub fn read(py: Python<'_>, path: PathBuf, options: Option<&Bound<'_, PyDict>>) 
         None => Meaning::Brightness,
     };
     let Wishes { run, how, .. } = Wishes::take("read", options.as_ref(), &["frame"])?;
-    let ((image, units), notes) = work(py, &how, move |session| {
+    let ((image, world), notes) = work(py, &how, move |session| {
         let options = run.frame.read_options_for(meaning)?;
         let loaded = atomesh_job::images::read(&path, &options, session)?;
-        let LoadedImage { image, units, .. } = loaded;
+        let (world, image) = (loaded.world(), loaded.image);
         let image = match image {
             AnyImage::Flat(image) => AnyImage::Flat(run.frame.place_as_is(image)?),
             AnyImage::Volume(image) => AnyImage::Volume(run.frame.place_as_is(image)?),
         };
-        Ok((image, units))
+        Ok((image, world))
     })?;
-    Ok(Image::new(image, units, notes))
+    Ok(Image::new(image, world, notes))
 }
 
 /// Takes out of keywords what the samples mean.
@@ -440,7 +441,7 @@ pub fn enhance(
     };
     let Wishes { run, how, .. } = Wishes::take("enhance", Some(&all), &["features", "frame"])?;
     let image = Image::like(image)?;
-    let (given, of) = (Arc::clone(&image.get().any), image.get().units.clone());
+    let (given, of) = (Arc::clone(&image.get().any), image.get().world.clone());
     let (made, notes) = work(py, &how, move |session| match &*given {
         AnyImage::Flat(image) => {
             enhanced(&run, image.clone(), units, &Dimension::plane(), session).map(AnyImage::Flat)
@@ -501,7 +502,7 @@ pub fn size_field(
     }
     let Wishes { run, fields, how } = Wishes::take("size_field", Some(&all), crate::options::MESH)?;
     let image = Image::like(image)?;
-    let (given, of) = (Arc::clone(&image.get().any), image.get().units.clone());
+    let (given, of) = (Arc::clone(&image.get().any), image.get().world.clone());
     let (made, notes) = work(py, &how, move |session| match &*given {
         AnyImage::Flat(image) => {
             distances(&run, image.clone(), fields, &Dimension::plane(), session).map(AnyImage::Flat)

@@ -16,6 +16,7 @@ use atomesh::image::Image as CoreImage;
 use atomesh::run::Outcome;
 use atomesh_draw::{DrawError, Picture, PictureFormat};
 use atomesh_io::image::AnyImage;
+use atomesh_io::mesh::World;
 use atomesh_job::features::FeaturesRequest;
 use atomesh_job::mesh::{MadeMesh, MeshImages, prepare};
 use atomesh_job::options::{OutputOptions, RunConfig};
@@ -45,14 +46,14 @@ pub struct Made<const D: usize> {
     pub run: RunConfig,
     pub outcome: Outcome<D>,
     pub image: CoreImage<D>,
-    pub units: Vec<String>,
+    pub world: World,
 }
 
 impl<const D: usize> Made<D> {
     /// The mesh as jobs take it.
     pub fn as_job<'a>(&'a self, run: &'a RunConfig, properties: &'a [Property]) -> MadeMesh<'a, D> {
-        let Self { outcome, image, units, .. } = self;
-        MadeMesh { run, outcome, image: Some(image), units, properties }
+        let Self { outcome, image, world, .. } = self;
+        MadeMesh { run, outcome, image: Some(image), world, properties }
     }
 
     /// The mesh of either kind, for Python.
@@ -264,6 +265,17 @@ impl Mesh {
             let shape = [corners.len() / self.dim(), self.dim()];
             let array = arrays::view(py, &self.shared, |s| &s.0.groups()[number].1, &shape)?;
             all.set_item(name, array)?;
+        }
+        Ok(all)
+    }
+
+    /// The groups of points by name, each an array of their numbers, uint32: atoms that `fixed` keeps in place ("well-1",
+    /// "well-2" ... in the order given). Of Voronoi cells, the numbers are those of the cells around them.
+    #[getter]
+    fn point_groups<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyDict>> {
+        let all = PyDict::new(py);
+        for (name, points) in self.body().point_groups() {
+            all.set_item(name, numpy::PyArray1::from_vec(py, points))?;
         }
         Ok(all)
     }
@@ -771,17 +783,17 @@ pub fn mesh(
     let Wishes { mut run, fields, how } = wishes;
     let (body, notes) = work(py, &how, move |session| {
         run.check()?;
-        let Opened { image, units, is_potential } = source.open(&mut run, session)?;
+        let Opened { image, world, is_potential } = source.open(&mut run, session)?;
         match image {
             AnyImage::Flat(image) => {
                 let dimension = Dimension::plane();
-                let shown = Shown { image, units, is_potential, fields };
+                let shown = Shown { image, world, is_potential, fields };
                 let images = shown.placed(&mut run, &dimension, session)?;
                 made(run, images, dimension, session)
             }
             AnyImage::Volume(image) => {
                 let dimension = Dimension::space();
-                let shown = Shown { image, units, is_potential, fields };
+                let shown = Shown { image, world, is_potential, fields };
                 let images = shown.placed(&mut run, &dimension, session)?;
                 made(run, images, dimension, session)
             }
@@ -796,10 +808,10 @@ fn made<const D: usize>(
     dimension: Dimension<D>,
     session: &mut Session<'_>,
 ) -> Result<Box<dyn Body>, JobError> {
-    let units = images.units.clone();
+    let world = images.world.clone();
     let (prepared, image) = prepare(&run, images, &dimension, session)?;
     let outcome = atomesh_job::mesh::meshed(&run, prepared, session)?;
-    Made { run, outcome, image, units }.into_body(dimension)
+    Made { run, outcome, image, world }.into_body(dimension)
 }
 
 /// Reads a mesh: .vtu .vtk .msh .msh2 .npz .inp, Voronoi cells that atomesh wrote (.vtu, or the .json of a list of

@@ -5,6 +5,7 @@
 
 use atomesh::run::Size;
 use atomesh_io::image::AnyImage;
+use atomesh_io::mesh::World;
 use atomesh_job::mesh::{GivenField, GivenFields};
 use atomesh_job::options::RunConfig;
 use atomesh_job::values::SizeValue;
@@ -31,7 +32,7 @@ const FIELDS: [&str; 5] = ["potential", "size_field", "beta_field", "mask", "lab
 pub struct Field {
     name: &'static str,
     image: AnyImage,
-    units: Vec<String>,
+    world: World,
 }
 
 impl Field {
@@ -40,9 +41,9 @@ impl Field {
         self.name == name
     }
 
-    /// The image and its units.
-    pub fn into_image(self) -> (AnyImage, Vec<String>) {
-        (self.image, self.units)
+    /// The image and its world.
+    pub fn into_image(self) -> (AnyImage, World) {
+        (self.image, self.world)
     }
 }
 
@@ -132,7 +133,7 @@ impl Wishes {
         let image = Image::like(value)?;
         let image = image.get();
         self.fields.retain(|field| field.name != name);
-        self.fields.push(Field { name, image: image.any().clone(), units: image.units().to_vec() });
+        self.fields.push(Field { name, image: image.any().clone(), world: image.world().clone() });
         // a size or weight given as one thing replaces the other
         match name {
             "size_field" => (self.run.lattice.size, self.run.lattice.frequency) = (None, None),
@@ -178,7 +179,7 @@ impl Wishes {
 
     /// Takes labels as the image itself, where no other is given: the boundaries between them are its features. Gives
     /// those in memory.
-    pub fn labels_alone(&mut self) -> Option<(AnyImage, Vec<String>)> {
+    pub fn labels_alone(&mut self) -> Option<(AnyImage, World)> {
         let labels = self.fields.iter().find(|field| field.name == "labels");
         if self.run.input.potential.is_some()
             || (labels.is_none() && self.run.input.labels.is_none())
@@ -186,7 +187,7 @@ impl Wishes {
             return None;
         }
         self.run.follow_labels();
-        labels.map(|labels| (labels.image.clone(), labels.units.clone()))
+        labels.map(|labels| (labels.image.clone(), labels.world.clone()))
     }
 
     /// The images in memory, for a mesh of `D` axes.
@@ -198,14 +199,14 @@ impl Wishes {
         dimension: &Dimension<D>,
     ) -> Result<GivenFields<D>, JobError> {
         let mut given = GivenFields::default();
-        for Field { name, image, units } in fields {
+        for Field { name, image, world } in fields {
             let found = image.dimension();
             let Some(image) = (dimension.image)(image) else {
                 return Err(JobError::content(format!(
                     "{name} has {found} axes; expected {D}, as the image"
                 )));
             };
-            let field = Some(GivenField { image, units });
+            let field = Some(GivenField { image, units: world.units });
             match name {
                 "potential" => given.potential = field,
                 "size_field" => given.size_field = field,

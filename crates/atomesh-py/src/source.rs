@@ -1,7 +1,8 @@
 //! What a mesh is made from: an image from a file or in memory, and images in memory beside it.
 
 use atomesh::image::Image as CoreImage;
-use atomesh_io::image::{AnyImage, LoadedImage};
+use atomesh_io::image::AnyImage;
+use atomesh_io::mesh::World;
 use atomesh_job::mesh::{MeshImages, ShownImage, read_shown};
 use atomesh_job::options::RunConfig;
 use atomesh_job::{Dimension, JobError, Session};
@@ -16,9 +17,9 @@ pub enum Source {
     /// A file, read with the options of the run.
     File,
     /// An image in memory.
-    Given(AnyImage, Vec<String>),
+    Given(AnyImage, World),
     /// A potential in memory, and no image.
-    Potential(AnyImage, Vec<String>),
+    Potential(AnyImage, World),
 }
 
 impl Source {
@@ -28,11 +29,11 @@ impl Source {
             let at = wishes.fields.iter().position(|field| field.is_named("potential"));
             return match at {
                 Some(at) => {
-                    let (image, units) = wishes.fields.remove(at).into_image();
-                    Ok(Self::Potential(image, units))
+                    let (image, world) = wishes.fields.remove(at).into_image();
+                    Ok(Self::Potential(image, world))
                 }
                 None => match wishes.labels_alone() {
-                    Some((image, units)) => Ok(Self::Given(image, units)),
+                    Some((image, world)) => Ok(Self::Given(image, world)),
                     None if wishes.run.input.shown().is_some() => Ok(Self::File),
                     None => {
                         let message = "no image; expected one, or potential= or labels=";
@@ -54,7 +55,7 @@ impl Source {
             return Ok(Self::File);
         }
         let image = Image::like(image)?;
-        Ok(Self::Given(image.get().any().clone(), image.get().units().to_vec()))
+        Ok(Self::Given(image.get().any().clone(), image.get().world().clone()))
     }
 
     /// The images that a mesh is made from.
@@ -62,29 +63,30 @@ impl Source {
     /// # Errors
     /// [`JobError`] if a file cannot be used, or an image is of no use.
     pub fn open(self, run: &mut RunConfig, session: &mut Session<'_>) -> Result<Opened, JobError> {
-        let (image, units, is_potential) = match self {
+        let (image, world, is_potential) = match self {
             Self::File => {
-                let LoadedImage { image, units, .. } = read_shown(run, session)?;
-                (image, units, false)
+                let loaded = read_shown(run, session)?;
+                let world = loaded.world();
+                (loaded.image, world, false)
             }
-            Self::Given(image, units) => (image, units, false),
-            Self::Potential(image, units) => (image, units, true),
+            Self::Given(image, world) => (image, world, false),
+            Self::Potential(image, world) => (image, world, true),
         };
-        Ok(Opened { image, units, is_potential })
+        Ok(Opened { image, world, is_potential })
     }
 }
 
 /// The image that gives the frame.
 pub struct Opened {
     pub image: AnyImage,
-    pub units: Vec<String>,
+    pub world: World,
     pub is_potential: bool,
 }
 
 /// The image that gives the frame, of a known dimension, with images in memory beside it.
 pub struct Shown<const D: usize> {
     pub image: CoreImage<D>,
-    pub units: Vec<String>,
+    pub world: World,
     pub is_potential: bool,
     pub fields: Vec<Field>,
 }
@@ -100,9 +102,9 @@ impl<const D: usize> Shown<D> {
         dimension: &Dimension<D>,
         session: &mut Session<'_>,
     ) -> Result<MeshImages<D>, JobError> {
-        let Self { image, units, is_potential, fields } = self;
+        let Self { image, world, is_potential, fields } = self;
         let given = Wishes::given(fields, dimension)?;
-        let shown = ShownImage { image, units };
+        let shown = ShownImage { image, world };
         let mut images = MeshImages::with_fields(run, shown, given, dimension, session)?;
         images.is_potential |= is_potential;
         name_fields(run, &images);

@@ -245,8 +245,8 @@ impl<const D: usize> ConnectedBody for Joined<D> {
             false => self.connected.clone().improve(session)?.finish(session),
         })();
         let outcome = outcome.map_err(|e| refusal(run, e))?;
-        let units = images.units.clone();
-        Made { run: run.clone(), outcome, image, units }.into_body(dimension.clone())
+        let world = images.world.clone();
+        Made { run: run.clone(), outcome, image, world }.into_body(dimension.clone())
     }
 }
 
@@ -506,11 +506,11 @@ fn made(
     let kept = run.clone();
     let (body, notes) = work(py, &how, move |session| {
         run.check()?;
-        let Opened { image, units, is_potential } = source.open(&mut run, session)?;
+        let Opened { image, world, is_potential } = source.open(&mut run, session)?;
         match image {
             AnyImage::Flat(image) => {
                 let dimension = Dimension::plane();
-                let shown = Shown { image, units, is_potential, fields };
+                let shown = Shown { image, world, is_potential, fields };
                 let images = shown.placed(&mut run, &dimension, session)?;
                 let atoms = match atoms {
                     None => None,
@@ -521,7 +521,7 @@ fn made(
             }
             AnyImage::Volume(image) => {
                 let dimension = Dimension::space();
-                let shown = Shown { image, units, is_potential, fields };
+                let shown = Shown { image, world, is_potential, fields };
                 let images = shown.placed(&mut run, &dimension, session)?;
                 let atoms = match atoms {
                     None => None,

@@ -3,7 +3,8 @@
 //! A transcript is a `console` block. `$ ` starts a command, which `sh` runs in a folder of its own for
 //! the file; `? N` is the exit code if it is not 0; the rest is what it prints on standard output and
 //! standard error. `[..]` stands for any text within a line, a line `...` for any lines. With
-//! ATOMESH_UPDATE=1 transcripts that differ are rewritten, to be read before they are kept. The README's
+//! ATOMESH_UPDATE=1 transcripts that differ are rewritten, to be read before they are kept. `$TOOLS` is the folder of
+//! shell functions that make files which the command itself does not write. The README's
 //! `console` blocks are one more transcript, which goes on where its main command ends.
 
 #![cfg(unix)]
@@ -59,6 +60,7 @@ fn execute(command: &str, folder: &Path) -> Run {
         .current_dir(folder)
         .env("PATH", format!("{}:{path}", program.parent().unwrap().display()))
         .env("LC_ALL", "C")
+        .env("TOOLS", concat!(env!("CARGO_MANIFEST_DIR"), "/tests/cmd/tools"))
         .env_remove("COLUMNS")
         .output()
         .expect("sh runs");

@@ -6,6 +6,7 @@ use std::path::PathBuf;
 use super::any_image::AnyImage;
 use super::scan_note::ScanNote;
 use super::traces::SampleFormat;
+use crate::mesh::{Standing, World};
 
 mod parts;
 
@@ -21,6 +22,16 @@ pub struct LoadedImage {
 }
 
 impl LoadedImage {
+    /// What is known of the image's world beside its frame.
+    pub fn world(&self) -> World {
+        let standing = self.notes.iter().find_map(|note| match note {
+            ReadNote::LevelSlice { z } => Some(Standing::level(*z)),
+            ReadNote::ObliqueSlice { origin, axes } => Some(Standing::along(*origin, *axes)),
+            _ => None,
+        });
+        World { units: self.units.clone(), standing }
+    }
+
     /// The same with one note more, if there is one.
     pub(super) fn noting(mut self, note: impl Into<Option<ReadNote>>) -> Self {
         self.notes.extend(note.into());

@@ -4,6 +4,7 @@ use std::io::{self, Write};
 use std::ops::Range;
 
 use super::field::Values;
+use super::standing::{Standing, placed, turned};
 
 /// The order of the bytes in a number.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -114,14 +115,32 @@ impl<'a> Column<'a> {
         }
     }
 
-    /// Points as x, y, z; z is 0 in a flat mesh.
-    pub fn points<const D: usize>(points: &'a [[f64; D]], endian: Endian) -> Self {
-        Self::new(points.len(), 24, move |range, out| {
-            for p in &points[range] {
-                for k in 0..3 {
-                    p.get(k).copied().unwrap_or(0.0).put(endian, out);
-                }
-            }
+    /// Points as x, y, z: of a flat mesh where it stands, or else at z = 0.
+    pub fn points<const D: usize>(
+        points: &'a [[f64; D]],
+        standing: Option<&'a Standing>,
+        endian: Endian,
+    ) -> Self {
+        Self::triples(points, move |p| placed(p, standing), endian)
+    }
+
+    /// Vectors likewise.
+    pub fn vectors<const D: usize>(
+        vectors: &'a [[f64; D]],
+        standing: Option<&'a Standing>,
+        endian: Endian,
+    ) -> Self {
+        Self::triples(vectors, move |v| turned(v, standing), endian)
+    }
+
+    /// Three numbers of each.
+    fn triples<const D: usize>(
+        items: &'a [[f64; D]],
+        of: impl Fn(&[f64; D]) -> [f64; 3] + Sync + 'a,
+        endian: Endian,
+    ) -> Self {
+        Self::new(items.len(), 24, move |range, out| {
+            items[range].iter().flat_map(&of).for_each(|x| x.put(endian, out));
         })
     }
 

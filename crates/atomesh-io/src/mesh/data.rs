@@ -8,6 +8,7 @@ use super::field::{Field, MeshDataError, Values, check_field};
 use super::inp::Sections;
 use super::metadata::{self, KnownAs};
 use super::provenance::Provenance;
+use super::standing::Standing;
 
 /// A mesh in world coordinates, with what is known at its points and cells; borrowed, since meshes
 /// are large.
@@ -169,6 +170,11 @@ impl<'a, const D: usize> MeshData<'a, D> {
     /// The groups of facets and cells, if there are any.
     pub fn tags(&self) -> Option<&'a Tags<D>> {
         self.tags
+    }
+
+    /// Where a flat mesh stands in space, if it is known.
+    pub(super) fn standing(&self) -> Option<&'a Standing> {
+        self.provenance?.standing.as_ref().filter(|_| D == 2)
     }
 
     /// The provenance, if it is known.

@@ -5,6 +5,7 @@ use atomesh::mesh::PointGroup;
 use serde_json::{Value, json};
 
 use super::provenance::Provenance;
+use super::standing::Standing;
 
 /// The array of the number of the group that each point is in, 0 for none, in formats that name their arrays.
 pub(super) const POINT_GROUP: &str = "point_group";
@@ -58,6 +59,9 @@ fn object<const D: usize>(
         object.insert("version".into(), p.version.clone().into());
         object.insert("seed".into(), p.seed.into());
         object.insert("options".into(), p.options.clone());
+        if let Some(standing) = &p.standing {
+            object.insert("standing".into(), json!(standing));
+        }
         if !p.units.is_empty() {
             object.insert("units".into(), json!(p.units));
         }
@@ -112,6 +116,19 @@ impl Metadata {
         serde_json::from_value(units).unwrap_or_default()
     }
 
+    /// Where a flat mesh stands in space.
+    pub fn standing(&self) -> Option<Standing> {
+        let standing: Standing = serde_json::from_value(self.0.get("standing")?.clone()).ok()?;
+        // of axes at right angles alone
+        let away = |p| standing.in_plane(standing.in_space(p));
+        let is_exact = |p: [f64; 2]| {
+            let [x, y, off] = away(p);
+            (x - p[0]).abs() + (y - p[1]).abs() + off.abs() < 1e-6
+        };
+        let size = standing.origin.iter().all(|x| x.is_finite());
+        (size && is_exact([1.0, 0.0]) && is_exact([0.0, 1.0])).then_some(standing)
+    }
+
     /// The provenance.
     pub fn provenance(&self) -> Option<Provenance> {
         Some(Provenance {
@@ -119,6 +136,7 @@ impl Metadata {
             options: self.0.get("options")?.clone(),
             seed: self.0.get("seed")?.as_u64()?,
             units: self.units(),
+            standing: self.standing(),
         })
     }
 

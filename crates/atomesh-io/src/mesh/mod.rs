@@ -23,6 +23,7 @@ pub mod openfoam;
 mod parts;
 mod provenance;
 pub(crate) mod read_error;
+pub(crate) mod standing;
 mod streamlines;
 mod table;
 mod tags;
@@ -41,8 +42,9 @@ pub use fluxes::{FacetFlux, FluxFiles, FluxTable, write_fluxes};
 pub use format::{MeshFormat, UnknownMeshFormat};
 pub use inp::{Elastic, SectionKind, Sections};
 pub use loaded::{AnyMesh, LoadedMesh};
-pub use provenance::Provenance;
+pub use provenance::{Provenance, World};
 pub use read_error::MeshReadError;
+pub use standing::Standing;
 pub use streamlines::{Streamlines, TracedLine, write_streamlines};
 
 use table::Row;

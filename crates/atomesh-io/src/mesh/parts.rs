@@ -150,6 +150,9 @@ impl Parts {
         if self.triangles.is_empty() {
             return Err(MeshReadError::NoCells { skipped: self.skipped_cells });
         }
+        if let Some(standing) = self.metadata.standing() {
+            self.points.iter_mut().for_each(|p| *p = standing.in_plane(*p));
+        }
         let (mut min, mut max, mut size) = (f64::INFINITY, f64::NEG_INFINITY, 0.0_f64);
         for p in &self.points {
             (min, max) = (min.min(p[2]), max.max(p[2]));

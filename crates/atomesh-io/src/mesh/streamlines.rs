@@ -116,7 +116,9 @@ pub fn write_streamlines<const D: usize>(
     head.array("Int32", "from", "", wells(|line| line.from));
     head.array("Int32", "to", "", wells(|line| line.to));
     head.text("</CellData>\n<Points>\n");
-    head.array("Float64", "Points", "NumberOfComponents=\"3\"", Column::points(&points, little));
+    let standing = data.provenance.and_then(|provenance| provenance.standing.as_ref());
+    let places = Column::points(&points, standing, little);
+    head.array("Float64", "Points", "NumberOfComponents=\"3\"", places);
     head.text("</Points>\n<Lines>\n");
     head.array("Int32", "connectivity", "", Column::numbers(count, little, |i| i as i32));
     head.array("Int32", "offsets", "", Column::slice(&ends, little));

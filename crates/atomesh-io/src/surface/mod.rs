@@ -1,7 +1,7 @@
 //! Surface files, written and read: VTP, STL, OBJ, PLY, GOCAD TSurf (`.ts`) and PLine (`.pl`).
 //!
 //! What is written are groups of facets, such as the features of an image: polylines of a flat mesh, in the
-//! plane z = 0, or triangles of a volume. Only the points that facets name are written, in the mesh's order
+//! plane z = 0 unless they stand elsewhere, or triangles of a volume. Only the points that facets name are written, in the mesh's order
 //! and each once, so that groups that meet share them; GOCAD's objects have points of their own. VTP, OBJ and
 //! PLY hold both lines and triangles, STL and TSurf triangles alone, PLine lines alone. Coordinates are the
 //! mesh's, in double precision, but single in STL.
@@ -26,7 +26,8 @@ pub use loaded::LoadedSurface;
 pub use read::{SurfaceReadError, read_surface};
 
 use crate::atomic_file::AtomicFile;
-use crate::mesh::MeshWriteError;
+use crate::mesh::standing::placed;
+use crate::mesh::{MeshWriteError, Standing};
 
 /// The formats of surface files.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
@@ -135,22 +136,24 @@ pub enum SurfaceWriteError {
 pub struct SurfaceExtras<'a> {
     /// One for each group, such as the mean of b; VTP alone holds them, as the cell array `potential`.
     pub values: Option<&'a [f32]>,
-    /// The world's axes; GOCAD alone holds them.
+    /// The world's axes; GOCAD alone holds their units.
     pub axes: Option<&'a WorldAxes>,
 }
 
 /// What the world's axes are.
-#[derive(Clone, Debug, Default, PartialEq, Eq)]
+#[derive(Clone, Debug, Default, PartialEq)]
 pub struct WorldAxes {
     /// Their units, such as `m` or `ms`; those missing are not known.
     pub units: Vec<String>,
     /// Whether z grows downwards, as depth and time do.
     pub z_down: bool,
+    /// Where a flat world stands in space, if it is known; in all formats points are there.
+    pub standing: Option<Standing>,
 }
 
 /// Groups of facets with the points that they name.
 struct Surface<'a, const D: usize> {
-    /// The points in use, in the mesh's order; z is 0 in flat meshes.
+    /// The points in use, in the mesh's order; z is 0 in flat meshes that stand nowhere else.
     points: Vec<[f64; 3]>,
     groups: Vec<Group<'a, D>>,
     axes: Option<&'a WorldAxes>,
@@ -194,7 +197,7 @@ impl<'a, const D: usize> Surface<'a, D> {
         for (&point, number) in &mut number {
             *number = points.len() as u32;
             let p = &mesh.points()[point as usize];
-            points.push(std::array::from_fn(|k| p.get(k).copied().unwrap_or(0.0)));
+            points.push(placed(p, axes.and_then(|axes| axes.standing.as_ref())));
         }
         let groups = groups.iter().enumerate().map(|(at, group)| Group {
             id: group.id,

@@ -58,7 +58,8 @@ fn with_data<const D: usize>(
     use_it: impl FnOnce(&CellData<D>),
 ) {
     let options = serde_json::json!({ "lattice": { "units": "physical" } });
-    let provenance = Provenance { version: "0".into(), options, seed: 7, units: Vec::new() };
+    let provenance =
+        Provenance { version: "0".into(), options, seed: 7, units: Vec::new(), standing: None };
     let features = features(mesh);
     let wells = &[NO_CELL, 5];
     use_it(&CellData { mesh, features: &features, frame, provenance: &provenance, wells });
@@ -492,6 +493,7 @@ fn written_without_features(frame: &Frame<2>, mesh: &PolyMesh<2>, rock: &Rock) -
         options: serde_json::json!({}),
         seed: 7,
         units: Vec::new(),
+        standing: None,
     };
     let features = FeatureFaces::default();
     let data = CellData { mesh, features: &features, frame, provenance: &provenance, wells: &[1] };

@@ -49,7 +49,8 @@ fn unmarked<const D: usize>(mesh: &PolyMesh<D>) -> FeatureFaces {
 fn with_data<const D: usize, T>(mesh: &PolyMesh<D>, use_it: impl FnOnce(&CellData<D>) -> T) -> T {
     let frame = Frame::new([4; D]).unwrap();
     let options = serde_json::json!({});
-    let provenance = Provenance { version: "0".into(), options, seed: 7, units: Vec::new() };
+    let provenance =
+        Provenance { version: "0".into(), options, seed: 7, units: Vec::new(), standing: None };
     let features = unmarked(mesh);
     let wells = &[3, NO_CELL, 7];
     use_it(&CellData { mesh, features: &features, frame: &frame, provenance: &provenance, wells })

@@ -68,6 +68,7 @@ fn write<const D: usize>(
         options: serde_json::json!({}),
         seed: 7,
         units: Vec::new(),
+        standing: None,
     };
     let (values, vectors) = (values(mesh), vec![[0.5; D]; mesh.cell_count()]);
     let data = MeshData::new(mesh).with_tags(tags).with_provenance(&provenance);

@@ -134,6 +134,7 @@ fn heads_of_cells<const D: usize>(
         options: serde_json::json!({}),
         seed: 0,
         units: Vec::new(),
+        standing: None,
     };
     let data = CellData {
         mesh: &mesh,

@@ -15,5 +15,6 @@ mod quadratic_files;
 mod real_images;
 mod scans;
 mod simulators;
+mod standing;
 mod surfaces;
 mod tags;

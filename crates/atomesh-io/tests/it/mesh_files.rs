@@ -70,6 +70,7 @@ fn provenance() -> Provenance {
         options: serde_json::json!({ "size": "6..18", "beta": 0.1, "odd": "<&\"$End] é" }),
         seed: u64::MAX,
         units: vec!["um".into(); 3],
+        standing: None,
     }
 }
 

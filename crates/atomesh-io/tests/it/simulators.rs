@@ -39,8 +39,13 @@ fn texts<const D: usize>(
 ) -> Vec<String> {
     let folder = tempfile::tempdir().unwrap();
     let files = SimulatorFiles::of(simulator, &folder.path().join("a.grid"), D);
-    let provenance =
-        Provenance { version: "0".into(), options: serde_json::json!({}), seed: 7, units: vec![] };
+    let provenance = Provenance {
+        version: "0".into(),
+        options: serde_json::json!({}),
+        seed: 7,
+        units: vec![],
+        standing: None,
+    };
     let features = FeatureFaces { of_faces: vec![], strengths: vec![], areas: vec![] };
     let wells = &[2];
     let data = CellData { mesh, features: &features, frame, provenance: &provenance, wells };

@@ -186,7 +186,8 @@ fn gocad_is_told_units_and_where_z_grows() {
         std::fs::read_to_string(&path).unwrap()
     };
     assert!(!text(None).contains("ZPOSITIVE"));
-    let mut axes = WorldAxes { units: vec!["m".into(), "m".into(), "ms".into()], z_down: true };
+    let units = vec!["m".into(), "m".into(), "ms".into()];
+    let mut axes = WorldAxes { units, z_down: true, standing: None };
     let found = text(Some(&axes));
     // each object has a system of its own, before its part
     assert_eq!(found.matches("ZPOSITIVE Depth\n").count(), groups.len());

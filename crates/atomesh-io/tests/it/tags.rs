@@ -105,6 +105,7 @@ fn check<const D: usize>(
         options: serde_json::json!({}),
         seed: 7,
         units: Vec::new(),
+        standing: None,
     };
     let data = MeshData::new(mesh).with_tags(tags).with_provenance(&provenance);
     for (name, format) in FORMATS {

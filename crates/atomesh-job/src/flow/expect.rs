@@ -3,7 +3,8 @@
 use atomesh::image::Image;
 use atomesh_flow::dg::{self, DgOptions};
 use atomesh_flow::solve::SolveMethod;
-use atomesh_io::image::{AnyImage, LoadedImage};
+use atomesh_io::image::AnyImage;
+use atomesh_io::mesh::World;
 
 use super::flow_mesh::AnyFlowMesh;
 use super::{FlowMesh, FlowMeshCells, FlowOptions, FlowRequest, Opened, Source};
@@ -44,13 +45,14 @@ pub fn expect(
             AnyFlowMesh::Volume(mesh) => of_mesh(&mesh, &options, &Dimension::space(), session),
         }),
         Source::Image(loaded) => {
-            let LoadedImage { image, units, .. } = *loaded;
+            let world = loaded.world();
+            let image = loaded.image;
             match image {
                 AnyImage::Flat(image) => {
-                    of_image(&run, &options, (image, units), &Dimension::plane(), session)
+                    of_image(&run, &options, (image, world), &Dimension::plane(), session)
                 }
                 AnyImage::Volume(image) => {
-                    of_image(&run, &options, (image, units), &Dimension::space(), session)
+                    of_image(&run, &options, (image, world), &Dimension::space(), session)
                 }
             }
         }
@@ -60,11 +62,11 @@ pub fn expect(
 fn of_image<const D: usize>(
     run: &RunConfig,
     options: &FlowOptions,
-    (image, units): (Image<D>, Vec<String>),
+    (image, world): (Image<D>, World),
     dimension: &Dimension<D>,
     session: &mut Session<'_>,
 ) -> Result<FlowExpectation, JobError> {
-    let mesh = expect_image(run, ShownImage { image, units }, dimension, session)?;
+    let mesh = expect_image(run, ShownImage { image, world }, dimension, session)?;
     let Expectation { cell_count, cells, memory, seconds, .. } = mesh;
     let equations = Equations::of::<D>(cell_count, run.is_voronoi(), options);
     // the mesh is there while equations are solved, what made it is not

@@ -225,13 +225,14 @@ pub fn flow_file(request: FlowRequest, session: &mut Session<'_>) -> Result<Flow
             AnyFlowMesh::Volume(mesh) => work.solve(mesh, &Dimension::space(), session),
         },
         Source::Image(loaded) => {
-            let LoadedImage { image, units, .. } = *loaded;
+            let world = loaded.world();
+            let image = loaded.image;
             match image {
                 AnyImage::Flat(image) => {
-                    work.mesh(ShownImage { image, units }, &Dimension::plane(), session)
+                    work.mesh(ShownImage { image, world }, &Dimension::plane(), session)
                 }
                 AnyImage::Volume(image) => {
-                    work.mesh(ShownImage { image, units }, &Dimension::space(), session)
+                    work.mesh(ShownImage { image, world }, &Dimension::space(), session)
                 }
             }
         }
@@ -311,12 +312,12 @@ impl FileRun<'_> {
         session: &mut Session<'_>,
     ) -> Result<FlowSummary, JobError> {
         let images = MeshImages::read_fields(self.run, image, dimension, session)?;
-        let units = images.units.clone();
+        let world = images.world.clone();
         let (prepared, image) = prepare(self.run, images, dimension, session)?;
         let image = self.files.picture.is_some().then_some(image);
         let mut mesh = FlowMesh::of_prepared(self.run, self.options, prepared, session)?;
         mesh.image = image;
-        mesh.provenance = mesh.provenance.map(|provenance| provenance.in_units(&units));
+        mesh.provenance = mesh.provenance.map(|provenance| provenance.in_world(&world));
         self.solve(mesh, dimension, session)
     }
 

@@ -5,6 +5,7 @@ use std::path::Path;
 use atomesh::image::{Between, Frame, Image, Samples as SampleValues};
 use atomesh::run::Inputs;
 use atomesh_io::image::{LoadedImage, Meaning, ReadOptions};
+use atomesh_io::mesh::World;
 
 use super::phases;
 use crate::dimension::Dimension;
@@ -20,13 +21,13 @@ use crate::session::{Note, NoteKind, Session};
 pub struct ShownImage<const D: usize> {
     /// The image.
     pub image: Image<D>,
-    /// The units of its world's axes, as [`LoadedImage::units`].
-    pub units: Vec<String>,
+    /// Its world, as [`LoadedImage::world`].
+    pub world: World,
 }
 
 impl<const D: usize> From<Image<D>> for ShownImage<D> {
     fn from(image: Image<D>) -> Self {
-        Self { image, units: Vec::new() }
+        Self { image, world: World::default() }
     }
 }
 
@@ -97,8 +98,8 @@ pub struct MeshImages<const D: usize> {
     pub mask: Option<Image<D>>,
     /// A label for each sample.
     pub labels: Option<Image<D>>,
-    /// The units of the world's axes, as [`LoadedImage::units`].
-    pub units: Vec<String>,
+    /// The world, as [`LoadedImage::world`].
+    pub world: World,
 }
 
 impl<const D: usize> MeshImages<D> {
@@ -112,7 +113,7 @@ impl<const D: usize> MeshImages<D> {
             weight_field: None,
             mask: None,
             labels: None,
-            units: Vec::new(),
+            world: World::default(),
         }
     }
 
@@ -140,10 +141,13 @@ impl<const D: usize> MeshImages<D> {
         dimension: &Dimension<D>,
         session: &mut Session<'_>,
     ) -> Result<Self, JobError> {
-        let ShownImage { image, units } = image.into();
+        let ShownImage { image, mut world } = image.into();
         let input = &run.input;
         let shown = input.shown();
-        let of = Samples::of(&image, units, run).map_err(|e| e.about_any(shown))?;
+        let of = Samples::of(&image, world.units.clone(), run).map_err(|e| e.about_any(shown))?;
+        // who says where it is says it in a plane
+        world.standing =
+            world.standing.filter(|_| of.placed == of.own && run.frame.y_up != Some(true));
         let image = images::place(image, &run.frame, shown, session)?;
         run.mesh_options::<D>()?;
         // what makes b is forecast where it is made
@@ -180,8 +184,7 @@ impl<const D: usize> MeshImages<D> {
         };
         let mask = phases::without_voids(run, mask, labels.as_ref(), session)?;
         let size_field = phases::sizes(run, size_field, labels.as_ref(), session)?;
-        let Samples { units, .. } = of;
-        Ok(Self { image, is_potential, potential, size_field, weight_field, mask, labels, units })
+        Ok(Self { image, is_potential, potential, size_field, weight_field, mask, labels, world })
     }
 
     /// Takes fields in memory in place of those that there are; the image is in place already.
@@ -195,7 +198,7 @@ impl<const D: usize> MeshImages<D> {
         session: &mut Session<'_>,
     ) -> Result<(), JobError> {
         let none = RunConfig { frame: FrameOptions::default(), ..run.clone() };
-        let of = Samples::of(&self.image, self.units.clone(), &none)?;
+        let of = Samples::of(&self.image, self.world.units.clone(), &none)?;
         let mut field = |given: Option<GivenField<D>>, kind: FieldKind| {
             let source = given.map(|given| FieldSource::of(given, &kind, session)).transpose()?;
             source.map(|s| s.in_place(&none, &of, kind.between, session)).transpose()

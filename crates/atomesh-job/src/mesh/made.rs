@@ -3,7 +3,7 @@
 use atomesh::image::Image;
 use atomesh::run::Outcome;
 use atomesh_io::mesh::cells::LoadedCells;
-use atomesh_io::mesh::{LoadedMesh, OwnedField};
+use atomesh_io::mesh::{LoadedMesh, OwnedField, World};
 
 use super::MeshSummary;
 use super::figures::{Figures, Measured, RunPage};
@@ -25,8 +25,8 @@ pub struct MadeMesh<'a, const D: usize> {
     pub outcome: &'a Outcome<D>,
     /// The image, which pictures and reports need.
     pub image: Option<&'a Image<D>>,
-    /// The units of the world's axes, if they are known.
-    pub units: &'a [String],
+    /// What is known of the world, as [`crate::mesh::MeshImages::world`].
+    pub world: &'a World,
     /// Properties of the cells, written with them.
     pub properties: &'a [Property],
 }
@@ -52,7 +52,7 @@ impl<const D: usize> MadeMesh<'_, D> {
             tags: outcome.tags().map_err(JobError::content)?,
             cell_fields: Vec::new(),
             frame: Some(*outcome.frame()),
-            provenance: Some(self.run.provenance::<D>().in_units(self.units)),
+            provenance: Some(self.run.provenance::<D>().in_world(self.world)),
             skipped_cells: 0,
             skipped_fields: Vec::new(),
         })
@@ -67,7 +67,7 @@ impl<const D: usize> MadeMesh<'_, D> {
             fields: Vec::new(),
             skipped_fields: Vec::new(),
             frame: *outcome.frame(),
-            provenance: self.run.provenance::<D>().in_units(self.units),
+            provenance: self.run.provenance::<D>().in_world(self.world),
             wells: cells_of_wells(outcome),
         })
     }
@@ -114,7 +114,7 @@ impl<const D: usize> MadeMesh<'_, D> {
         dimension: &Dimension<D>,
         session: &mut Session<'_>,
     ) -> Result<MeshSummary, JobError> {
-        let Self { run, outcome, image, units, properties } = *self;
+        let Self { run, outcome, image, world, properties } = *self;
         let measured = match image {
             Some(image) if outputs.needs_report() => Measured::All(image),
             _ if measures_shape => Measured::Shape,
@@ -123,7 +123,7 @@ impl<const D: usize> MadeMesh<'_, D> {
         let figures = Figures::new(run, outcome, measured, dimension.tools, session)?;
         let tagged = session.write_together(|group, session| {
             let outputs = &outputs.staged(group)?;
-            let writing = Writing { run, outputs, outcome, units, properties, dimension };
+            let writing = Writing { run, outputs, outcome, world, properties, dimension };
             let tagged = writing.write(image, session)?;
             self.write_about(&writing, &figures, session)?;
             Ok(tagged)

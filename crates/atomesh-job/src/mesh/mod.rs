@@ -27,7 +27,7 @@ use std::path::{Path, PathBuf};
 use atomesh::image::Image;
 use atomesh::improve::ImproveReport;
 use atomesh::run::{Estimate, Outcome, Prepared};
-use atomesh_io::image::{AnyImage, LoadedImage};
+use atomesh_io::image::AnyImage;
 
 use crate::dimension::Dimension;
 use crate::error::JobError;
@@ -145,13 +145,14 @@ pub fn mesh_file(
     let outputs = Outputs::new(&run, options.write_config)?;
     outputs.check(&run, session)?;
     let work = FileRun { run: &run, outputs: &outputs, options };
-    let LoadedImage { image, units, .. } = read_shown(&run, session)?;
+    let loaded = read_shown(&run, session)?;
+    let (world, image) = (loaded.world(), loaded.image);
     match image {
         AnyImage::Flat(image) => {
-            work.run(ShownImage { image, units }, &Dimension::plane(), session)
+            work.run(ShownImage { image, world }, &Dimension::plane(), session)
         }
         AnyImage::Volume(image) => {
-            work.run(ShownImage { image, units }, &Dimension::space(), session)
+            work.run(ShownImage { image, world }, &Dimension::space(), session)
         }
     }
 }
@@ -163,13 +164,14 @@ pub fn mesh_file(
 pub fn expect(mut run: RunConfig, session: &mut Session<'_>) -> Result<Expectation, JobError> {
     run.take_labels_alone();
     run.check()?;
-    let LoadedImage { image, units, .. } = read_shown(&run, session)?;
+    let loaded = read_shown(&run, session)?;
+    let (world, image) = (loaded.world(), loaded.image);
     match image {
         AnyImage::Flat(image) => {
-            expect_image(&run, ShownImage { image, units }, &Dimension::plane(), session)
+            expect_image(&run, ShownImage { image, world }, &Dimension::plane(), session)
         }
         AnyImage::Volume(image) => {
-            expect_image(&run, ShownImage { image, units }, &Dimension::space(), session)
+            expect_image(&run, ShownImage { image, world }, &Dimension::space(), session)
         }
     }
 }
@@ -230,12 +232,12 @@ impl FileRun<'_> {
     ) -> Result<MeshSummary, JobError> {
         let (run, outputs) = (self.run, self.outputs);
         let images = MeshImages::read_fields(run, image, dimension, session)?;
-        let units = images.units.clone();
+        let world = images.world.clone();
         let (prepared, image) = prepare(run, images, dimension, session)?;
         let image = outputs.needs_image().then_some(image);
         let outcome = meshed(run, prepared, session)?;
         let image = image.as_ref();
-        let made = MadeMesh { run, outcome: &outcome, image, units: &units, properties: &[] };
+        let made = MadeMesh { run, outcome: &outcome, image, world: &world, properties: &[] };
         made.write_outputs(outputs, self.options.measures_shape, dimension, session)
     }
 }

@@ -3,6 +3,7 @@
 use atomesh::enhance::without_noise;
 use atomesh::fields::default_distance;
 use atomesh::image::{Image, Samples};
+use atomesh::region::samples_inside;
 use atomesh::run::Size;
 use rayon::prelude::*;
 
@@ -74,16 +75,9 @@ pub(super) fn without_voids<const D: usize>(
     let labels = labels.ok_or_else(|| no_labels(option))?;
     note_unknown(option, named.iter().copied(), labels, session);
     let samples = labels.samples();
-    let given = mask.as_ref().map(Image::samples);
-    // a mask of shares from 0 to 1 is inside from one half on, as the core takes it
-    let is_share = given.is_some_and(|given| {
-        let range = given.range();
-        range.min >= 0.0 && range.max <= 1.0
-    });
-    let is_inside = |at: usize| {
-        let value = given.map_or(1.0, |given| given.get(at));
-        if is_share { value >= 0.5 } else { value != 0.0 }
-    };
+    let given = mask.as_ref().map(|mask| samples_inside(mask.samples())).transpose();
+    let given = given.map_err(|e| JobError::content(format!("the mask: {e}")))?;
+    let is_inside = |at: usize| given.as_ref().is_none_or(|given| given[at]);
     let is_kept = |at: usize| is_of(samples.get(at), named) == keeps && is_inside(at);
     let kept: Vec<u8> =
         (0..samples.len()).into_par_iter().map(|at| u8::from(is_kept(at))).collect();
@@ -203,6 +197,9 @@ mod tests {
         assert!(of("only = \"7\"", None, session).is_err());
         assert!(session.notes()[0].text.contains("label 7"));
         assert!(without_voids(&run("[regions]\nvoid = \"0\""), mask, None, session).is_err());
+        let odd = Some(image(&[1.0, f32::NAN, 1.0, 0.0, 1.0, 1.0]));
+        let refusal = of("void = \"0\"", odd, session).unwrap_err();
+        assert!(refusal.to_string().contains("NaN"), "{refusal}");
 
         let text = "[lattice]\nsize = 5.0\n[regions]\nsize-of = [\"1=2\", \"2=3.5\"]";
         let field = sizes(&run(text), None, Some(&labels), session).unwrap().unwrap();

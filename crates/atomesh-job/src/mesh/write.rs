@@ -10,7 +10,7 @@ use atomesh::run::Outcome;
 use atomesh::watch::Phase;
 use atomesh_draw::Style;
 use atomesh_io::mesh::cells::{CellData, NO_CELL};
-use atomesh_io::mesh::{MeshData, MeshFormat, Provenance, Sections};
+use atomesh_io::mesh::{MeshData, MeshFormat, Provenance, Sections, World};
 
 use super::format::OutputFormat;
 use super::outputs::Outputs;
@@ -35,8 +35,8 @@ pub(super) struct Writing<'a, const D: usize> {
     pub run: &'a RunConfig,
     pub outputs: &'a Outputs,
     pub outcome: &'a Outcome<D>,
-    /// The units of the world's axes, if they are known.
-    pub units: &'a [String],
+    /// What is known of the world beside the frame.
+    pub world: &'a World,
     /// Properties of the cells.
     pub properties: &'a [Property],
     pub dimension: &'a Dimension<D>,
@@ -67,7 +67,7 @@ impl<const D: usize> Writing<'_, D> {
         if let Some(path) = &self.outputs.potential {
             self.write_potential(path, session)?;
         }
-        let provenance = self.run.provenance::<D>().in_units(self.units);
+        let provenance = self.run.provenance::<D>().in_world(self.world);
         match self.outputs.format {
             OutputFormat::Simplices(format) => self.write_simplices(format, &provenance, session),
             _ => self.write_voronoi(&provenance, session).map(|()| None),

@@ -259,7 +259,13 @@ impl RunConfig {
         run.frame.data_root = None;
         let seed = run.optimize.seed.unwrap_or(0);
         let options = serde_json::to_value(run).unwrap_or_default();
-        Provenance { version: env!("CARGO_PKG_VERSION").into(), options, seed, units: Vec::new() }
+        Provenance {
+            version: env!("CARGO_PKG_VERSION").into(),
+            options,
+            seed,
+            units: Vec::new(),
+            standing: None,
+        }
     }
 
     /// Labels alone are the image, and the boundaries between them its features.

@@ -52,6 +52,9 @@ pub trait Body: Send + Sync {
     /// Groups of facets.
     fn groups(&self) -> &[Group];
 
+    /// Groups of points, or of Voronoi cells, by their numbers.
+    fn point_groups(&self) -> Vec<Group>;
+
     /// Regions of cells.
     fn regions(&self) -> Option<&Regions>;
 

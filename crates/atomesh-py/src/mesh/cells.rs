@@ -2,11 +2,11 @@
 
 use atomesh::geometry::Bounds;
 use atomesh::image::Units;
-use atomesh::mesh::{FacetGroup, PolyMesh, Regions};
+use atomesh::mesh::{FacetGroup, PolyMesh, Regions, well_name};
 use atomesh_draw::Style;
 use atomesh_io::image::AnyImage;
 use atomesh_io::mesh::OwnedField;
-use atomesh_io::mesh::cells::LoadedCells;
+use atomesh_io::mesh::cells::{LoadedCells, NO_CELL};
 use atomesh_job::features::{FeaturesRequest, features_of_cells};
 use atomesh_job::flow::{FlowMesh, FlowOptions};
 use atomesh_job::measure::measure_cells;
@@ -117,6 +117,11 @@ impl<const D: usize> Body for CellsBody<D> {
 
     fn groups(&self) -> &[Group] {
         &self.groups
+    }
+
+    fn point_groups(&self) -> Vec<Group> {
+        let wells = self.loaded.wells.iter().zip(1..).filter(|(cell, _)| **cell != NO_CELL);
+        wells.map(|(&cell, number)| (well_name(number), vec![cell])).collect()
     }
 
     fn regions(&self) -> Option<&Regions> {

@@ -86,6 +86,11 @@ impl<const D: usize> Body for SimplexBody<D> {
         &self.groups
     }
 
+    fn point_groups(&self) -> Vec<Group> {
+        let groups = self.loaded.tags.point_groups().iter();
+        groups.map(|group| (group.name.clone(), group.points.clone())).collect()
+    }
+
     fn regions(&self) -> Option<&Regions> {
         self.loaded.tags.regions()
     }

@@ -51,8 +51,8 @@ proptest! {
             prop_assert_eq!(par().map(|x| if *x < 995 { Ok(*x) } else { Err(*x) }).collect::<Result<Vec<_>, _>>(),
                 v.iter().map(|x| if *x < 995 { Ok(*x) } else { Err(*x) }).collect::<Result<Vec<_>, _>>());
             let mut more = vec![7];
-            more.par_extend(&v);
-            more.par_extend(par().filter(odd));
+            more.par_extend(par().copied());
+            more.par_extend(par().filter(odd).copied());
             prop_assert_eq!(more.len(), 1 + v.len() + v.iter().filter(odd).count());
             let (mut a, mut b) = (v.clone(), v.clone());
             a.par_iter_mut().zip(&other).for_each(|(x, y)| *x -= y);
@@ -99,7 +99,7 @@ fn states_are_made_for_blocks_of_at_least_so_many_items() {
                 *seen
             };
             let seen: Vec<usize> =
-                (0..1000).into_par_iter().with_min_len(least).map_init(init, count).collect();
+                (0..1000_usize).into_par_iter().with_min_len(least).map_init(init, count).collect();
             let blocks = states.into_inner();
             assert_eq!(seen.iter().filter(|seen| **seen == 1).count(), blocks);
             assert!(blocks <= most.min((1000 / least).max(1)), "{blocks} of {least}");
@@ -121,7 +121,7 @@ fn a_vectors_memory_is_used_again() {
 #[test]
 #[should_panic(expected = "on its way")]
 fn a_panic_is_passed_on() {
-    let strings = (0..100).into_par_iter().map(|i: usize| {
+    let strings = (0..100_usize).into_par_iter().map(|i| {
         assert!(i != 70, "on its way");
         i.to_string()
     });

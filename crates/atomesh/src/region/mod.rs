@@ -27,8 +27,7 @@ pub use islands::join_islands;
 pub use labels::{Interface, closed_surface, interfaces, label_samples};
 pub use layers::ThinLayer;
 pub(crate) use layers::{LabelImage, thin_layers};
-pub use outline::Outline;
-pub(crate) use outline::samples_inside;
+pub use outline::{Outline, samples_inside};
 pub(crate) use trim::free_axes;
 pub use trim::{Trimmed, outline_facets, trim_to_outline};
 

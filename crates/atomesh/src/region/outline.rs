@@ -221,8 +221,11 @@ fn shift(shares: &mut [f32], whole: f64, sigma: f64) {
     }
 }
 
-/// Whether each sample of a mask is inside: not 0, or, of shares, one half or more.
-pub(crate) fn samples_inside(mask: &Samples) -> Result<Vec<bool>, RegionError> {
+/// Whether each sample of a mask is inside: not 0, or, where all values are within 0…1, one half or more.
+///
+/// # Errors
+/// [`RegionError::NotFinite`] names the first value that is no number.
+pub fn samples_inside(mask: &Samples) -> Result<Vec<bool>, RegionError> {
     Ok(shares(mask)?.into_iter().map(|share| share >= 0.5).collect())
 }
 

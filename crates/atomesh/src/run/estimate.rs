@@ -40,7 +40,7 @@ impl Work {
     fn atom_bytes(self) -> [f64; 2] {
         match self {
             Self::AsGrown => [390.0, 1400.0], // crystals have ties, which cost
-            Self::Moved => [530.0, 950.0],
+            Self::Moved => [530.0, 1450.0],   // of brains, whose features are everywhere
             Self::Conforming => [530.0, 1250.0],
             Self::Divided => [900.0, 3100.0],
         }

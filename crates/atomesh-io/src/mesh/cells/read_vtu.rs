@@ -48,15 +48,21 @@ pub(super) fn read_cells_vtu(bytes: &[u8]) -> Result<RawCells, MeshReadError> {
         piece.cell_data.iter().filter(is_left).map(|array| array.name.to_owned()).collect();
     let text = document.field_data.iter().find(|array| array.name == metadata::NAME);
     let text = text.map(Array::string).transpose()?.unwrap_or_default();
+    let metadata = Metadata::decode(&text);
+    let standing = metadata.standing().filter(|_| dimension == 2);
+    let in_plane = |places: Vec<[f64; 3]>| match &standing {
+        Some(standing) => places.into_iter().map(|p| standing.in_plane(p)).collect(),
+        None => places,
+    };
     let cells = RawCells {
         dimension,
-        sites: sites.as_chunks::<3>().0.to_vec(),
+        sites: in_plane(sites.as_chunks::<3>().0.to_vec()),
         volumes: named("volume")?.reals(piece.cells)?,
         fields,
         skipped_fields,
-        faces: Some((points(piece)?, faces(piece, dimension)?)),
+        faces: Some((in_plane(points(piece)?), faces(piece, dimension)?)),
         features: features(&document.field_data)?,
-        metadata: Metadata::decode(&text),
+        metadata,
     };
     match piece.cell_data.iter().find(|array| array.name == CELL) {
         Some(order) => ordered(cells, &order.indices(piece.cells)?),

@@ -10,6 +10,7 @@ use super::super::column::{Column, Endian};
 use super::super::error::MeshWriteError;
 use super::super::field::Values;
 use super::super::metadata;
+use super::super::standing::{placed, turned};
 use super::super::vtu::appended::Head;
 use super::{CellData, WELL};
 
@@ -53,12 +54,12 @@ pub fn write_cells_vtu_with<const D: usize>(
     fields: &CellFields<D>,
     watch: &mut dyn Watch,
 ) -> Result<(), MeshWriteError> {
-    let (text, mesh) = (data.metadata(), data.mesh);
+    let (text, mesh, little) = (data.metadata(), data.mesh, Endian::Little);
     let order = file_order(mesh);
     let topology = Topology::of(mesh, &order);
     let features = FeatureArrays::of(data);
     let wells = data.well_of_cells();
-    let points = padded(mesh.points());
+    let standing = data.provenance.standing.as_ref();
     let mut head = Head::new("UnstructuredGrid");
     head.text("<FieldData>\n");
     head.field_data("UInt8", metadata::NAME, Column::slice(text.as_bytes(), Endian::Little));
@@ -69,7 +70,7 @@ pub fn write_cells_vtu_with<const D: usize>(
     head.text(&format!("<Piece NumberOfPoints=\"{count}\" NumberOfCells=\"{cells}\">\n"));
     name_cell_data(&mut head, data, (&order, &wells), fields);
     head.text("<Points>\n");
-    head.array("Float64", "Points", vectors, Column::slice(&points, Endian::Little));
+    head.array("Float64", "Points", vectors, Column::points(mesh.points(), standing, little));
     head.text("</Points>\n<Cells>\n");
     head.array("Int64", "connectivity", "", Column::slice(&topology.corners, Endian::Little));
     head.array("Int64", "offsets", "", Column::slice(&topology.ends, Endian::Little));
@@ -111,8 +112,13 @@ fn name_cell_data<'a, const D: usize>(
     let mesh = data.mesh;
     let (little, cells) = (Endian::Little, order.len());
     let place = move |at: usize| order[at] as usize;
+    let standing = data.provenance.standing.as_ref();
+    let site = |sites: &'a [[f64; D]]| {
+        let component = move |i: usize| placed(&sites[place(i / 3)], standing)[i % 3];
+        Column::numbers(3 * cells, little, component)
+    };
     let vector = |vectors: &'a [[f64; D]]| {
-        let component = move |i: usize| vectors[place(i / 3)].get(i % 3).copied().unwrap_or(0.0);
+        let component = move |i: usize| turned(&vectors[place(i / 3)], standing)[i % 3];
         Column::numbers(3 * cells, little, component)
     };
     let three = "NumberOfComponents=\"3\"";
@@ -125,7 +131,7 @@ fn name_cell_data<'a, const D: usize>(
         Column::numbers(cells, little, move |i| measures[place(i)]),
     );
     let center_name = if mesh.sites().is_some() { "site" } else { "center" };
-    head.array("Float64", center_name, three, vector(mesh.centers()));
+    head.array("Float64", center_name, three, site(mesh.centers()));
     if D == 3 {
         head.array("UInt32", CELL, "", Column::slice(order, little));
     }
@@ -184,12 +190,6 @@ impl FeatureArrays {
         head.array("UInt32", FEATURE_CELLS, &pairs, Column::slice(&self.cells, Endian::Little));
         head.field_data("UInt32", FEATURE, Column::slice(&self.features, Endian::Little));
     }
-}
-
-/// Coordinates one after another, three a point.
-fn padded<const D: usize>(points: &[[f64; D]]) -> Vec<f64> {
-    let padded = |p: &[f64; D]| [0, 1, 2].map(|k| p.get(k).copied().unwrap_or(0.0));
-    points.iter().flat_map(padded).collect()
 }
 
 /// VTK's arrays. A polyhedron's faces are told as: how many; for each, how many points, and which.

@@ -10,6 +10,7 @@ use super::super::behind::cell_behind;
 use super::super::data::MeshData;
 use super::super::error::MeshWriteError;
 use super::super::metadata;
+use super::super::standing::placed;
 use super::super::tags::plain_name;
 use super::sections::{Elastic, SectionKind, Sections};
 use super::{CELLS, face_number};
@@ -46,7 +47,7 @@ pub fn write_inp<const D: usize>(
     }
     to.line(format_args!("*NODE"))?;
     for (i, p) in data.nodes().iter().enumerate() {
-        let [x, y, z] = [0, 1, 2].map(|k| number(p.get(k).copied().unwrap_or(0.0)));
+        let [x, y, z] = placed(p, data.standing()).map(number);
         to.line(format_args!("{}, {x}, {y}, {z}", i + 1))?;
     }
     let each = data.nodes_per_cell();

@@ -11,6 +11,7 @@ use super::super::cell_fields::VectorField;
 use super::super::data::MeshData;
 use super::super::field::{Field, Values};
 use super::super::format::MshVersion;
+use super::super::standing::{Standing, turned};
 use super::entities::Entities;
 
 /// The place of a value that is not known.
@@ -26,7 +27,7 @@ pub(super) struct Quantity<'a> {
 
 enum Numbers<'a> {
     Scalars(Values<'a>),
-    Vectors { all: &'a [f64], axes: usize },
+    Vectors { all: &'a [f64], axes: usize, standing: Option<&'a Standing> },
 }
 
 impl<'a> Quantity<'a> {
@@ -35,9 +36,12 @@ impl<'a> Quantity<'a> {
         Self { name: field.name(), components: 1, numbers }
     }
 
-    /// Vectors have three components, z being 0 in flat meshes.
-    pub fn vectors<const D: usize>(field: &VectorField<'a, D>) -> Self {
-        let numbers = Numbers::Vectors { all: field.vectors().as_flattened(), axes: D };
+    /// Vectors have three components, in the plane of flat meshes.
+    pub fn vectors<const D: usize>(
+        field: &VectorField<'a, D>,
+        standing: Option<&'a Standing>,
+    ) -> Self {
+        let numbers = Numbers::Vectors { all: field.vectors().as_flattened(), axes: D, standing };
         Self { name: field.name(), components: 3, numbers }
     }
 
@@ -46,8 +50,12 @@ impl<'a> Quantity<'a> {
         match self.numbers {
             _ if place == NOWHERE => f64::NAN,
             Numbers::Scalars(values) => values.get(place as usize),
-            Numbers::Vectors { axes, .. } if k >= axes => 0.0,
-            Numbers::Vectors { all, axes } => all[place as usize * axes + k],
+            Numbers::Vectors { all, axes, standing } => {
+                match all[place as usize * axes..][..axes] {
+                    [x, y] => turned(&[x, y], standing)[k],
+                    ref whole => whole[k],
+                }
+            }
         }
     }
 }

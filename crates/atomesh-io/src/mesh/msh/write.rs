@@ -10,6 +10,7 @@ use super::super::column::{Endian, Number};
 use super::super::data::MeshData;
 use super::super::error::MeshWriteError;
 use super::super::format::{MshEncoding, MshVersion};
+use super::super::standing::{Standing, placed};
 use super::entities::Entities;
 use super::values::{Quantity, element_cells};
 use super::{POINT, element_type, place};
@@ -44,7 +45,8 @@ pub fn write_msh<const D: usize>(
     let fields = data.cell_fields().len() + data.cell_vectors().len();
     let steps = 2 + data.point_fields().len() + fields;
     let items = (steps * count.max(1)) as f64;
-    let mut numbers = Numbers { out, bytes: vec![], encoding, watch, done: 0, items };
+    let standing = data.standing();
+    let mut numbers = Numbers { out, bytes: vec![], encoding, watch, standing, done: 0, items };
     numbers.head(version, &data.metadata_with_numbers(&entities.known_as))?;
     physical_names(&mut numbers, &entities);
     match version {
@@ -70,7 +72,8 @@ pub fn write_msh<const D: usize>(
             field_data(&mut numbers, "ElementData", &Quantity::numbers(field), all())?;
         }
         for field in data.cell_vectors() {
-            field_data(&mut numbers, "ElementData", &Quantity::vectors(field), all())?;
+            let vectors = Quantity::vectors(field, standing);
+            field_data(&mut numbers, "ElementData", &vectors, all())?;
         }
     }
     numbers.flush()
@@ -82,6 +85,8 @@ struct Numbers<'a, W> {
     bytes: Vec<u8>,
     encoding: MshEncoding,
     watch: &'a mut dyn Watch,
+    /// Where a flat mesh stands.
+    standing: Option<&'a Standing>,
     done: usize,
     items: f64,
 }
@@ -193,9 +198,7 @@ impl<W: Write> Numbers<'_, W> {
     }
 
     fn point<const D: usize>(&mut self, p: &[f64; D]) {
-        for k in 0..3 {
-            self.real(p.get(k).copied().unwrap_or(0.0));
-        }
+        placed(p, self.standing).into_iter().for_each(|x| self.real(x));
     }
 }
 

@@ -9,6 +9,7 @@ use super::super::column::{Column, Endian};
 use super::super::data::MeshData;
 use super::super::error::MeshWriteError;
 use super::super::field::{Field, Values};
+use super::super::standing::Standing;
 use super::super::{metadata, vtu};
 
 /// Writes a mesh as a legacy VTK file: big-endian binary, points as double, fields in their own precision;
@@ -37,7 +38,7 @@ pub fn write_vtk<const D: usize>(
     writeln!(out, "FIELD FieldData 1\n{name} 1 {} unsigned_char\n{text}", text.len())?;
     check(watch, Phase::Write, 0.0, None)?;
     writeln!(out, "POINTS {points} double")?;
-    Column::points(data.nodes(), big).write(out)?;
+    Column::points(data.nodes(), data.standing(), big).write(out)?;
     check(watch, Phase::Write, 0.3, None)?;
     writeln!(out, "\nCELLS {cells} {list}")?;
     let each = Column::new(cells, 4 * (count + 1), move |range, bytes| {
@@ -52,18 +53,18 @@ pub fn write_vtk<const D: usize>(
     let kind = i32::from(vtu::cell_type(count));
     Column::numbers(cells, big, move |_| kind).write(out)?;
     writeln!(out, "\nPOINT_DATA {points}")?;
-    fields::<D>(out, data.point_fields(), &[], &data.group_of_points())?;
+    fields::<D>(out, data.point_fields(), (&[], None), &data.group_of_points())?;
     check(watch, Phase::Write, 0.9, None)?;
     writeln!(out, "CELL_DATA {cells}")?;
-    fields(out, data.cell_fields(), data.cell_vectors(), &[])?;
+    fields(out, data.cell_fields(), (data.cell_vectors(), data.standing()), &[])?;
     Ok(())
 }
 
-/// Numbers, then vectors of three components, z being 0 in flat meshes, and the groups of points, if there are any.
+/// Numbers, then vectors of three components, in the plane of flat meshes, and the groups of points, if there are any.
 fn fields<const D: usize>(
     out: &mut impl Write,
     fields: &[Field],
-    vectors: &[VectorField<D>],
+    (vectors, standing): (&[VectorField<D>], Option<&Standing>),
     groups: &[u32],
 ) -> Result<(), MeshWriteError> {
     let count = fields.len() + vectors.len() + usize::from(!groups.is_empty());
@@ -82,7 +83,7 @@ fn fields<const D: usize>(
     }
     for field in vectors {
         writeln!(out, "{} 3 {} double", field.name(), field.vectors().len())?;
-        Column::points(field.vectors(), Endian::Big).write(out)?;
+        Column::vectors(field.vectors(), standing, Endian::Big).write(out)?;
         writeln!(out)?;
     }
     if !groups.is_empty() {

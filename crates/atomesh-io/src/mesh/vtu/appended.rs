@@ -16,6 +16,7 @@ use super::super::cell_fields::VectorField;
 use super::super::column::{Column, Endian};
 use super::super::error::MeshWriteError;
 use super::super::field::{Field, Values};
+use super::super::standing::Standing;
 
 /// Bytes of a block before compression. Large enough for zlib to do well (its window has 32 KiB),
 /// small enough for many threads.
@@ -91,15 +92,16 @@ impl<'a> Head<'a> {
         self.array(kind, name, &tuples, column);
     }
 
-    /// Names fields of cells, then vectors, z being 0 in flat meshes, then an array of Int32.
+    /// Names fields of cells, then vectors, in the plane of flat meshes, then an array of Int32.
     pub fn cell_data<const D: usize>(
         &mut self,
         fields: &[Field<'a>],
         vectors: &[VectorField<'a, D>],
+        standing: Option<&'a Standing>,
         numbers: Option<(&str, Column<'a>)>,
     ) {
         self.text("<CellData>\n");
-        self.cell_fields(fields, vectors);
+        self.cell_fields(fields, vectors, standing);
         if let Some((name, column)) = numbers {
             self.array("Int32", name, "", column);
         }
@@ -111,10 +113,11 @@ impl<'a> Head<'a> {
         &mut self,
         fields: &[Field<'a>],
         vectors: &[VectorField<'a, D>],
+        standing: Option<&'a Standing>,
     ) {
         fields.iter().for_each(|field| self.field(field));
         for field in vectors {
-            let column = Column::points(field.vectors(), Endian::Little);
+            let column = Column::vectors(field.vectors(), standing, Endian::Little);
             self.array("Float64", field.name(), "NumberOfComponents=\"3\"", column);
         }
     }

@@ -9,6 +9,7 @@ use super::super::column::{Column, Endian, fits_i32};
 use super::super::data::MeshData;
 use super::super::error::MeshWriteError;
 use super::super::metadata;
+use super::super::standing::placed;
 use super::appended::Head;
 use crate::atomic_file::AtomicFile;
 
@@ -50,12 +51,12 @@ pub fn write_broken_vtu<const D: usize>(
     head.text("</PointData>\n");
     let regions = data.tags().and_then(Tags::regions);
     let region = regions.map(|r| ("region", Column::slice(&r.of_cells, little)));
-    head.cell_data(data.cell_fields(), data.cell_vectors(), region);
+    let standing = data.standing();
+    head.cell_data(data.cell_fields(), data.cell_vectors(), standing, region);
     head.text("<Points>\n");
     let places = Column::numbers(3 * points, little, move |i| {
         let (point, axis) = (i / 3, i % 3);
-        let place = node_place(mesh, point / each, point % each);
-        place.get(axis).copied().unwrap_or(0.0)
+        placed(&node_place(mesh, point / each, point % each), standing)[axis]
     });
     head.array("Float64", "Points", "NumberOfComponents=\"3\"", places);
     head.text("</Points>\n<Cells>\n");

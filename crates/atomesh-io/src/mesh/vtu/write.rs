@@ -99,10 +99,11 @@ fn piece<'a, const D: usize>(head: &mut Head<'a>, data: &MeshData<'a, D>, groups
     head.fields("PointData", data.point_fields(), of_points);
     let regions = data.tags().and_then(Tags::regions);
     let region = regions.map(|r| ("region", Column::slice(&r.of_cells, Endian::Little)));
-    head.cell_data(data.cell_fields(), data.cell_vectors(), region);
+    head.cell_data(data.cell_fields(), data.cell_vectors(), data.standing(), region);
     head.text("<Points>\n");
     let vectors = "NumberOfComponents=\"3\"";
-    head.array("Float64", "Points", vectors, Column::points(data.nodes(), Endian::Little));
+    let places = Column::points(data.nodes(), data.standing(), Endian::Little);
+    head.array("Float64", "Points", vectors, places);
     head.text("</Points>\n<Cells>\n");
     let each = data.nodes_per_cell();
     if fits_i32(corners.len().max(points)) {
