@@ -46,22 +46,20 @@ impl Facing {
     }
 }
 
-/// Does `work` for every number below `count`, a batch at a time, and hands results to `keep` in order.
+/// Does `work` with every task, a batch at a time; each thread has a scratch of its own.
 ///
 /// # Errors
 /// [`Cancelled`] if the watch ends the work.
-pub(super) fn in_order<T: Send>(
-    count: usize,
+pub(super) fn in_batches<T: Send, S: Default + Send>(
+    mut tasks: Vec<T>,
     watch: &mut dyn Watch,
-    work: impl Fn(usize) -> T + Sync,
-    mut keep: impl FnMut(usize, T),
+    work: impl Fn(&mut S, &mut T) + Sync + Send,
 ) -> Result<(), Cancelled> {
     let batch = 4 * rayon::current_num_threads();
-    for start in (0..count).step_by(batch) {
-        check(watch, Phase::Potential, start as f64 / count as f64, None)?;
-        let numbers = start..(start + batch).min(count);
-        let made: Vec<T> = numbers.clone().into_par_iter().map(&work).collect();
-        numbers.zip(made).for_each(|(number, made)| keep(number, made));
+    let count = tasks.len();
+    for (number, tasks) in tasks.chunks_mut(batch).enumerate() {
+        check(watch, Phase::Potential, (number * batch) as f64 / count as f64, None)?;
+        tasks.par_iter_mut().for_each_init(S::default, &work);
     }
     Ok(())
 }

@@ -1,8 +1,9 @@
 //! From the best plane of every sample to crests: non-maximum suppression across the planes.
 
 use super::background::Background;
+use super::between::Found;
 use super::facing::volume;
-use super::scan::{Found, Orientation};
+use super::scan::Orientation;
 use crate::crests::FeaturePoint;
 use crate::image::Grid;
 use crate::parallel::prelude::*;

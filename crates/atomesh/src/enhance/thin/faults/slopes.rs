@@ -1,6 +1,6 @@
 //! The slopes of layers: by how many samples they go down for one sample along x, and along y.
 
-use crate::image::{Grid, StructureTensor};
+use crate::image::{Grid, StructureTensor, coordinates};
 use crate::parallel::prelude::*;
 use crate::watch::{Cancelled, Watch};
 
@@ -17,9 +17,6 @@ const DOWN: f64 = 8.0;
 /// The greatest slope along which layers are followed.
 const STEEPEST: f32 = 2.0;
 
-/// Samples of one task.
-const BLOCK: usize = 4096;
-
 /// The slopes along x (and y), in samples of depth a sample, x fastest.
 ///
 /// A layer of normal n slopes by −nₓ/n along x, over the last component of n.
@@ -32,16 +29,18 @@ pub(super) fn slopes<const D: usize>(
     let window = std::array::from_fn(|k| if k + 1 == D { DOWN } else { ACROSS });
     let tensor = StructureTensor::new(values, &samples, DERIVATIVE, window, watch)?;
     let mut slopes = vec![vec![0.0; values.len()]; D - 1];
-    let mut parts: Vec<_> = slopes.iter_mut().map(|s| s.chunks_mut(BLOCK)).collect();
-    let mut blocks: Vec<Vec<&mut [f32]>> = (0..values.len().div_ceil(BLOCK))
+    let width = grid.shape[0];
+    let mut parts: Vec<_> = slopes.iter_mut().map(|s| s.chunks_mut(width)).collect();
+    let mut rows: Vec<Vec<&mut [f32]>> = (0..values.len() / width)
         .map(|_| parts.iter_mut().filter_map(Iterator::next).collect())
         .collect();
-    blocks.par_iter_mut().enumerate().for_each(|(block, slopes)| {
-        for i in 0..slopes[0].len() {
-            let (normal, _) = tensor.normal(block * BLOCK + i);
+    rows.par_iter_mut().enumerate().for_each(|(row, slopes)| {
+        let Some(normals) = tensor.row(coordinates(row * width, grid.shape)) else { return };
+        for x in 0..width {
+            let (normal, _) = normals.normal(x);
             for (axis, slopes) in slopes.iter_mut().enumerate() {
                 let slope = -normal[axis] / normal[D - 1]; // infinite where a layer stands on end
-                slopes[i] = if slope.is_nan() { 0.0 } else { slope.clamp(-STEEPEST, STEEPEST) };
+                slopes[x] = if slope.is_nan() { 0.0 } else { slope.clamp(-STEEPEST, STEEPEST) };
             }
         }
     });

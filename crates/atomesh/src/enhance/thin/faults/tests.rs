@@ -127,8 +127,8 @@ fn plane_is_found<const D: usize>(shape: [usize; D], normal: [f64; D]) {
         // the two samples at a jump are alike to within half a sample, and windows may tilt
         assert!(error.abs() < 1.0, "{error} at {:?} of {normal:?}", crest.position);
         let cosine: f64 = (0..D).map(|k| crest.normal[k] * normal[k] / norm).sum();
-        // half a step of dip and of strike is 4°, as much again as windows end at the border
-        assert!(cosine.abs() > 10f64.to_radians().cos(), "{:?} for {normal:?}", crest.normal);
+        // half a step of strike and two of dip, as windows end at the border
+        assert!(cosine.abs() > 12f64.to_radians().cos(), "{:?} for {normal:?}", crest.normal);
         count += 1;
         off += error * error;
     }
@@ -230,7 +230,8 @@ fn mirrored_layers_have_mirrored_faults() {
     }
     // only ties and roundings know left from right; a weak end may be in one and not in the other
     assert!(crests.len() > 200);
-    assert!(alike(&crests, &back, 0.05) > 0.98 && alike(&back, &crests, 0.05) > 0.98);
+    let alike = [alike(&crests, &back, 0.05), alike(&back, &crests, 0.05)];
+    assert!(alike.iter().all(|&share| share > 0.98), "{alike:?}");
 }
 
 #[test]
