@@ -192,12 +192,43 @@ pub(super) fn moving_sum(
     stride: usize,
     width: usize,
 ) {
-    scratch.fill(0.0);
+    match width {
+        3 => sum_at_once(values, scratch, stride, |[a, b, c]| a + (b + c)),
+        5 => sum_at_once(values, scratch, stride, |[a, b, c, d, e]| a + ((b + c) + (d + e))),
+        _ => sum_doubling(values, scratch, stride, width),
+    }
+    std::mem::swap(values, scratch);
+}
+
+/// The sums of the patches that are usual, in one pass and to the same bits as [`sum_doubling`].
+fn sum_at_once<const N: usize>(
+    values: &[f32],
+    sums: &mut [f32],
+    stride: usize,
+    sum: impl Fn([f32; N]) -> f32,
+) {
+    let whole = values.len().saturating_sub((N - 1) * stride);
+    let moved: [&[f32]; N] = std::array::from_fn(|k| &values[(k * stride).min(values.len())..]);
+    let (inside, rest) = sums.split_at_mut(whole);
+    if whole > 0 {
+        let moved = moved.map(|values| &values[..whole]);
+        for (i, out) in inside.iter_mut().enumerate() {
+            *out = sum(moved.map(|values| values[i]));
+        }
+    }
+    for (i, out) in (whole..).zip(rest) {
+        *out = sum(moved.map(|values| values.get(i).copied().unwrap_or(0.0)));
+    }
+}
+
+/// Sums of any width.
+fn sum_doubling(values: &mut [f32], sums: &mut [f32], stride: usize, width: usize) {
+    sums.fill(0.0);
     let (mut done, mut span) = (0, 1);
     loop {
         if width & span != 0 {
             let from = (done * stride).min(values.len());
-            scratch.iter_mut().zip(&values[from..]).for_each(|(sum, v)| *sum += v);
+            sums.iter_mut().zip(&values[from..]).for_each(|(sum, v)| *sum += v);
             done += span;
         }
         if done == width {
@@ -209,5 +240,20 @@ pub(super) fn moving_sum(
         }
         span *= 2;
     }
-    std::mem::swap(values, scratch);
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn sums_at_once_are_those_by_doubling() {
+        let values: Vec<f32> = (0..200).map(|i| (i * i * 31 % 97) as f32 / 9.7).collect();
+        for (width, stride) in [(3, 1), (3, 20), (5, 1), (5, 17), (5, 90), (3, 300)] {
+            let (mut fast, mut slow, mut sums) = (values.clone(), values.clone(), values.clone());
+            moving_sum(&mut fast, &mut vec![7.0; 200], stride, width);
+            sum_doubling(&mut slow, &mut sums, stride, width);
+            assert_eq!(fast, sums, "{width} {stride}");
+        }
+    }
 }
