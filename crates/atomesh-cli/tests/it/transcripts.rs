@@ -60,7 +60,7 @@ fn execute(command: &str, folder: &Path) -> Run {
         .current_dir(folder)
         .env("PATH", format!("{}:{path}", program.parent().unwrap().display()))
         .env("LC_ALL", "C")
-        .env("TOOLS", concat!(env!("CARGO_MANIFEST_DIR"), "/tests/cmd/tools"))
+        .env("TOOLS", concat!(env!("CARGO_MANIFEST_DIR"), "/tests/tools"))
         .env_remove("COLUMNS")
         .output()
         .expect("sh runs");
