@@ -43,7 +43,7 @@ def test_wells_have_names(tmp_path: Path) -> None:
     image = am.Image(np.zeros((30, 40)))
     wells = [(12.5, 7.25), (31.0, 20.0)]
     for kind in ("delaunay", "voronoi"):
-        mesh = am.mesh(image, size=5, features="none", fixed=wells, mesh=kind)
+        mesh = am.mesh(image, size=5, features="none", fixed=wells, kind=kind)
         places = mesh.points if kind == "delaunay" else mesh.sites
         mesh.write(tmp_path / "m.vtu")
         for found in (mesh, am.read_mesh(tmp_path / "m.vtu")):

@@ -6,7 +6,7 @@
 //!
 //! The modules follow that order; each names only modules above it in this list.
 
-pub mod parallel;
+mod parallel;
 pub mod geometry;
 pub mod watch;
 pub mod minimize;

@@ -146,8 +146,9 @@ impl<const D: usize> MeshImages<D> {
         let shown = input.shown();
         let of = Samples::of(&image, world.units.clone(), run).map_err(|e| e.about_any(shown))?;
         // who says where it is says it in a plane
-        world.standing =
-            world.standing.filter(|_| of.placed == of.own && run.frame.y_up != Some(true));
+        let FrameOptions { spacing, origin, direction, y_up, .. } = &run.frame;
+        let is_placed = spacing.is_some() || origin.is_some() || direction.is_some();
+        world.standing = world.standing.filter(|_| !is_placed && *y_up != Some(true));
         let image = images::place(image, &run.frame, shown, session)?;
         run.mesh_options::<D>()?;
         // what makes b is forecast where it is made

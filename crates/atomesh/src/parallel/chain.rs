@@ -59,7 +59,7 @@ pub trait Parallel: Sized {
     }
 
     /// What is in each item, one after another.
-    fn flatten_iter(self) -> FlatMap<Self, fn(Self::Item) -> Self::Item>
+    fn flatten_iter(self) -> Flatten<Self>
     where
         Self::Item: IntoIterator,
     {
@@ -216,6 +216,9 @@ impl<P: Parallel, R: IntoIterator, F: Fn(P::Item) -> R + Sync> Parallel for Flat
         P::items(&step.0, block, start).flat_map(&step.1)
     }
 }
+
+/// [`Parallel::flatten_iter`].
+pub type Flatten<P> = FlatMap<P, fn(<P as Parallel>::Item) -> <P as Parallel>::Item>;
 
 /// [`Parallel::enumerate`].
 #[derive(Clone, Debug)]

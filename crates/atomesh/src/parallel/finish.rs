@@ -1,6 +1,5 @@
 //! What ends a parallel loop.
 
-use std::iter::Sum;
 use std::sync::atomic::{AtomicBool, AtomicUsize, Ordering};
 
 use super::chain::Parallel;
@@ -48,8 +47,7 @@ pub trait Finish: Parallel {
         Self::Item: Send,
     {
         let (source, step, least) = self.parts();
-        let of_block =
-            |block, start| Self::items(&step, block, start).fold(identity(), |a, b| op(a, b));
+        let of_block = |block, start| Self::items(&step, block, start).fold(identity(), &op);
         in_blocks(source, least, of_block).into_iter().fold(identity(), op)
     }
 
@@ -66,7 +64,8 @@ pub trait Finish: Parallel {
         in_blocks(source, least, of_block).into_iter().flatten().reduce(op)
     }
 
-    /// The items of each block put together, beginning with `init`: [`Folded::reduce`] does the same with the blocks.
+    /// The items of each block put together, beginning with `init`: the `reduce` of what is returned does
+    /// the same with the blocks.
     fn fold<T: Send>(
         self,
         init: impl Fn() -> T + Sync,
@@ -75,13 +74,6 @@ pub trait Finish: Parallel {
         let (source, step, least) = self.parts();
         let of_block = |block, start| Self::items(&step, block, start).fold(init(), &f);
         Folded(in_blocks(source, least, of_block))
-    }
-
-    /// The sum of whole numbers.
-    fn sum<S: Send + Sum<Self::Item> + Sum<S>>(self) -> S {
-        let (source, step, least) = self.parts();
-        let of_block = |block, start| Self::items(&step, block, start).sum();
-        in_blocks::<_, S>(source, least, of_block).into_iter().sum()
     }
 
     /// How many items there are.

@@ -31,8 +31,7 @@ use rayon::iter::{IndexedParallelIterator, ParallelIterator};
 /// All that parallel loops need.
 pub mod prelude {
     pub use super::{
-        Finish, FromParallel, IntoParallel, Parallel, ParallelExtend, ParallelSlice,
-        ParallelSliceMut,
+        Finish, IntoParallel, Parallel, ParallelExtend, ParallelSlice, ParallelSliceMut,
     };
 }
 

@@ -1,6 +1,5 @@
 //! Where parallel loops begin.
 
-use std::cmp::Ordering;
 use std::ops::Range;
 
 use super::chain::{Parallel, Plain};
@@ -136,11 +135,6 @@ pub trait ParallelSliceMut<T: Send> {
         T: Ord,
     {
         rayon::slice::ParallelSliceMut::par_sort_unstable(self.slice_mut());
-    }
-
-    /// Sorts by `compare`; items that are equal may change places.
-    fn par_sort_unstable_by(&mut self, compare: impl Fn(&T, &T) -> Ordering + Sync) {
-        rayon::slice::ParallelSliceMut::par_sort_unstable_by(self.slice_mut(), compare);
     }
 
     /// Sorts by `key`; items that are equal may change places.

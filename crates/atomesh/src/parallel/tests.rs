@@ -29,7 +29,7 @@ proptest! {
             prop_assert_eq!(par().filter_map(half).collect::<Vec<_>>(), v.iter().filter_map(half).collect::<Vec<_>>());
             let some = |x: &i64| 0..x % 4;
             prop_assert_eq!(par().flat_map_iter(some).collect::<Vec<_>>(), v.iter().flat_map(some).collect::<Vec<_>>());
-            prop_assert_eq!(par().map(some).flatten_iter().sum::<i64>(), v.iter().flat_map(some).sum::<i64>());
+            prop_assert_eq!(par().map(some).flatten_iter().reduce(|| 0, |a, b| a + b), v.iter().flat_map(some).sum::<i64>());
             let pairs: Vec<_> = par().zip(&other).enumerate().map(|(i, (a, b))| (i, a * b)).collect();
             prop_assert_eq!(pairs, v.iter().zip(&other).enumerate().map(|(i, (a, b))| (i, a * b)).collect::<Vec<_>>());
             let large = |x: &i64| *x > 600;
