@@ -59,11 +59,12 @@ section = section.astype(np.float32)
 # ## The mesh
 #
 # `features="faults"` compares amplitudes along the layers, and averages along the fault's dip: over `dip_reach` samples,
-# about which faults come out too long at their tips. The wells are `fixed` atoms: they become points of the mesh.
+# about which faults come out too long at their tips. So short an average lets noise through, in short pieces: what is shorter
+# than `least_length` is dropped. The wells are `fixed` atoms: they become points of the mesh.
 
 # %%
 wells = {"injector": (28.0, 70.0), "producer": (215.0, 90.0)}
-options = {"size": 8, "features": "faults", "dip_reach": 6}
+options = {"size": 8, "features": "faults", "dip_reach": 6, "least_length": 30}
 mesh = am.mesh(section, fixed=list(wells.values()), **options)
 mesh
 
