@@ -69,28 +69,31 @@ pub(super) struct RawTags {
 }
 
 impl RawTags {
-    /// Puts points into the groups of these numbers, one for each point; 0 is none.
+    /// Puts points into the groups of these numbers, one for each point; 0 is none. A number that no group can have is
+    /// left out later.
     pub fn points_of(&mut self, groups: &[u32]) {
         let in_group = groups.iter().enumerate().filter(|(_, group)| **group > 0);
-        self.points.extend(in_group.map(|(point, &group)| (point as u32, group as i32)));
+        let number = |group: &u32| i32::try_from(*group).unwrap_or(0);
+        self.points.extend(in_group.map(|(point, group)| (point as u32, number(group))));
     }
 
     /// Gives groups of points the names that atomesh has given them, and their numbers where the file has others
     /// beside the names.
     pub fn name_points(&mut self, metadata: &Metadata) {
+        let mut own = HashMap::new();
         for (id, name) in metadata.point_groups() {
-            let id = id as i32;
+            let Ok(id) = i32::try_from(id) else { continue };
             let known = self.names.iter_mut().find(|(dim, _, known)| *dim == 0 && *known == name);
             match known {
                 Some((_, number, _)) => {
-                    let number = std::mem::replace(number, id);
-                    let own = self.points.iter_mut().filter(|(_, group)| *group == number);
-                    own.for_each(|(_, group)| *group = -id); // not to be taken for another's
+                    own.insert(std::mem::replace(number, id), id);
                 }
                 None => self.names.push((0, id, name)),
             }
         }
-        self.points.iter_mut().for_each(|(_, group)| *group = group.abs());
+        for (_, group) in &mut self.points {
+            *group = own.get(group).copied().unwrap_or(*group);
+        }
     }
 
     /// The groups of points, each of them in the first that has it, and the number of points left out.

@@ -344,3 +344,19 @@ fn physical_points_of_gmsh_are_groups_of_points() {
     assert_eq!(read.tags.facet_groups()[0].name, "rim");
     assert_eq!(read.skipped_cells, 1, "the point that is in a group before");
 }
+
+/// Numbers of groups that do not fit are left out, with no panic.
+#[test]
+fn groups_of_points_with_absurd_numbers_are_left_out() {
+    let mesh = Delaunay::<2>::new().connect(&points(4), &mut Silent).unwrap();
+    let absurd = |id| PointGroup { id, name: "well-1".into(), points: vec![3] };
+    for id in [1 << 31, u32::MAX] {
+        let tags = Tags::default().with_point_groups(&mesh, vec![absurd(id)]).unwrap();
+        let data = MeshData::new(&mesh).with_tags(&tags);
+        let folder = tempfile::tempdir().unwrap();
+        let path = folder.path().join("a.npz");
+        write_mesh_as(&path, MeshFormat::Npz, &data, &mut Silent).unwrap();
+        let AnyMesh::Flat(read) = read_mesh(&path).unwrap() else { panic!("triangles") };
+        assert_eq!((read.tags.point_groups().len(), read.skipped_cells), (0, 1));
+    }
+}
