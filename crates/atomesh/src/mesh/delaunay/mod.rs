@@ -1,20 +1,19 @@
 //! Connecting points by Delaunay's rule: no point lies inside the circumsphere of a cell.
 //!
 //! The points are checked, scaled by a power of two, which is exact, and put along a Hilbert curve;
-//! a connector that knows its dimension makes the cells; the cells are put in a canonical order.
+//! insertion one by one makes the cells; the cells are put in a canonical order.
 //! Threads share the work, but nothing depends on them, and the cells do not depend on the order of
 //! the points either.
 //!
-//! In 3-D, points on a common sphere, as in every perfect crystal, leave the choice of cells open.
+//! Points on a common circle or sphere, as in every perfect crystal, leave the choice of cells open.
 //! It is made as if each point's lift |x|² were raised by an infinitesimal amount, larger by orders
 //! for points later in lexicographic order (Devillers & Teillaud 2011). The result is valid, has no
 //! cell without volume, and is the same however the points are numbered.
 
 mod canonical;
-mod plane;
+mod insertion;
 mod prepare;
 mod rounds;
-mod space;
 #[cfg(test)]
 mod tests;
 
@@ -122,16 +121,22 @@ fn in_order<const D: usize, const N: usize>(prepared: &Prepared<D>, cells: &[u32
 }
 
 impl Delaunay<2> {
-    /// Triangles, by the crate `spade`.
+    /// Triangles, by incremental insertion (Bowyer 1981, Watson 1981), on all threads.
     pub fn new() -> Self {
-        Self { connector: plane::connect, arranger: |of, cells| in_order::<2, 3>(of, cells) }
+        Self {
+            connector: insertion::connect::<2, 3>,
+            arranger: |of, cells| in_order::<2, 3>(of, cells),
+        }
     }
 }
 
 impl Delaunay<3> {
     /// Tetrahedra, by incremental insertion (Bowyer 1981, Watson 1981), on all threads.
     pub fn new() -> Self {
-        Self { connector: space::connect, arranger: |of, cells| in_order::<3, 4>(of, cells) }
+        Self {
+            connector: insertion::connect::<3, 4>,
+            arranger: |of, cells| in_order::<3, 4>(of, cells),
+        }
     }
 }
 

@@ -31,11 +31,11 @@ fn crystal<const D: usize>(sites: &[Point<D>], side: Point<D>, cells: usize) -> 
 
 const HALF: f64 = 0.5;
 
-fn square(cells: usize) -> Vec<Point<2>> {
+pub(super) fn square(cells: usize) -> Vec<Point<2>> {
     crystal(&[[0.0, 0.0]], [1.0; 2], cells)
 }
 
-fn hexagonal(cells: usize) -> Vec<Point<2>> {
+pub(super) fn hexagonal(cells: usize) -> Vec<Point<2>> {
     crystal(&[[0.0, 0.0], [HALF, HALF]], [1.0, 3.0_f64.sqrt()], cells)
 }
 
@@ -57,9 +57,9 @@ pub(super) fn scaled<const D: usize>(points: &[Point<D>], factor: f64) -> Vec<Po
 }
 
 /// Each point moved by up to half the amount along each axis.
-pub(super) fn jittered(points: &[Point<3>], amount: f64) -> Vec<Point<3>> {
-    let shifts = scatter::<3>(points.len(), 3);
-    let moved = |(p, shift): (&Point<3>, &Point<3>)| {
+pub(super) fn jittered<const D: usize>(points: &[Point<D>], amount: f64) -> Vec<Point<D>> {
+    let shifts = scatter::<D>(points.len(), 3);
+    let moved = |(p, shift): (&Point<D>, &Point<D>)| {
         std::array::from_fn(|k| p[k] + amount * (shift[k] - 0.5))
     };
     points.iter().zip(&shifts).map(moved).collect()
@@ -178,7 +178,7 @@ fn a_rim_of_hundreds_of_vertices_closes() {
     let mut points = on_the_unit_sphere(600, 9);
     points.push([0.01, 0.02, 0.0]);
     let order = (0..points.len() as u32).collect();
-    let cells = space::connect_in_order(&points, order, &mut Silent).unwrap().unwrap();
+    let cells = insertion::connect_in_order(&points, order, &mut Silent).unwrap().unwrap();
     let mesh = Mesh::new(points, cells).unwrap();
     mesh.validate().unwrap();
     mesh.check_delaunay().unwrap();
@@ -406,19 +406,51 @@ fn cells_do_not_depend_on_the_order_of_the_points() {
     order_of_points_does_not_matter(Delaunay::<3>::new(), &face_centered(2));
 }
 
+/// Below [`Delaunay::connect`], which sorts: here the insertion itself is shuffled.
+fn order_of_insertion_does_not_matter<const D: usize, const N: usize>(points: &[Point<D>])
+where
+    insertion::Simplices: insertion::Dimension<D, N>,
+{
+    let mut order: Vec<u32> = (0..points.len() as u32).collect();
+    let cells = |order: &[u32]| {
+        insertion::connect_in_order(points, order.to_vec(), &mut Silent).unwrap().unwrap()
+    };
+    let expected = cells(&order);
+    for seed in 0..5 {
+        shuffle(&mut order, seed);
+        assert_eq!(cells(&order), expected, "seed {seed}");
+    }
+}
+
 #[test]
 fn perturbation_makes_cells_independent_of_the_order_of_insertion() {
-    // Below `connect`, which sorts: here the insertion itself is shuffled.
+    order_of_insertion_does_not_matter(&square(9));
+    order_of_insertion_does_not_matter(&hexagonal(5));
+    let circle = cospherical_integers().into_iter().filter(|p| p[2] == 0.0);
+    order_of_insertion_does_not_matter(&circle.map(|p| [p[0], p[1]]).collect::<Vec<_>>());
     for points in [cubic(4), face_centered(3), body_centered(3)] {
-        let mut order: Vec<u32> = (0..points.len() as u32).collect();
-        let cells = |order: &[u32]| {
-            space::connect_in_order(&points, order.to_vec(), &mut Silent).unwrap().unwrap()
-        };
-        let expected = cells(&order);
-        for seed in 0..5 {
-            shuffle(&mut order, seed);
-            assert_eq!(cells(&order), expected, "seed {seed}");
-        }
+        order_of_insertion_does_not_matter(&points);
+    }
+}
+
+/// Cells by the crate `spade`.
+fn cells_by_spade(points: &[Point<2>]) -> Mesh<2> {
+    use spade::{DelaunayTriangulation, Point2, Triangulation};
+    let vertices = points.iter().map(|&[x, y]| Point2::new(x, y)).collect();
+    let triangulation = DelaunayTriangulation::<_>::bulk_load_stable(vertices).unwrap();
+    let faces = triangulation.inner_faces();
+    let corners = faces.flat_map(|face| face.vertices().map(|v| v.fix().index() as u32)).collect();
+    Mesh::new(points.to_vec(), corners).unwrap()
+}
+
+#[test]
+fn cells_in_the_plane_are_those_of_another_program() {
+    let cloud = scatter::<2>(20_000, 30);
+    let graded = cloud.iter().map(|p| p.map(|x| x.powi(6))).collect();
+    // no four points are on one circle but by rounding: the triangulation is unique
+    for points in [cloud, graded, jittered(&square(100), 0.1), jittered(&hexagonal(60), 1e-6)] {
+        let mesh = Delaunay::<2>::new().connect(&points, &mut Silent).unwrap();
+        assert_eq!(cells_as_points(&mesh), cells_as_points(&cells_by_spade(&points)));
     }
 }
 

@@ -13,35 +13,39 @@
 //! of one triangulation, whatever the parts. Where everything is seam, as on a sphere, all points are
 //! inserted in the first part in the end.
 
+use super::dimension::{Dimension, Simplices};
 use super::part::Part;
-use super::storage::{FACETS, INFINITE, Mark};
+use super::storage::{INFINITE, Mark};
 use super::{STRIDE, Triangulation, rounds};
 use crate::geometry::Bounds;
 use crate::parallel::prelude::*;
 use crate::watch::{Cancelled, Phase, Watch, check};
 
 /// A facet on the border between final cells of other parts and the rest.
-struct Border {
+struct Border<const D: usize> {
     /// Its vertices in the first part, ascending.
-    vertices: [u32; 3],
+    vertices: [u32; D],
     /// Whether sorting them took an odd number of swaps, as seen from the final cell.
     odd: bool,
 }
 
 /// The triangulations of the parts, without the cells that are not of the whole. Work is reported
 /// from `share` on.
-pub(super) fn join(
-    mut parts: Vec<Part>,
+pub(super) fn join<const D: usize, const N: usize>(
+    mut parts: Vec<Part<D, N>>,
     share: f64,
     watch: &mut dyn Watch,
-) -> Result<Vec<Triangulation>, Cancelled> {
+) -> Result<Vec<Triangulation<D, N>>, Cancelled>
+where
+    Simplices: Dimension<D, N>,
+{
     if parts.len() == 1 {
         return Ok(parts.into_iter().map(|part| part.triangulation).collect());
     }
-    let boxes: Vec<Bounds<3>> = parts.iter().map(|part| part.bounds).collect();
+    let boxes: Vec<Bounds<D>> = parts.iter().map(|part| part.bounds).collect();
     parts[1..].par_iter_mut().enumerate().for_each(|(before, part)| {
         let index = before + 1;
-        let others: Vec<Bounds<3>> = boxes
+        let others: Vec<Bounds<D>> = boxes
             .iter()
             .enumerate()
             .filter(|other| other.0 != index)
@@ -66,13 +70,16 @@ pub(super) fn join(
     Ok(triangulations)
 }
 
-impl Triangulation {
+impl<const D: usize, const N: usize> Triangulation<D, N>
+where
+    Simplices: Dimension<D, N>,
+{
     /// Takes the vertices of the other's loose cells and gives them in order of insertion; the loose
     /// cells are freed.
-    fn take_seam(&mut self, other: &mut Self, border: &mut Vec<Border>) -> Vec<u32> {
+    fn take_seam(&mut self, other: &mut Self, border: &mut Vec<Border<D>>) -> Vec<u32> {
         let mut seam: Vec<u32> = Vec::new();
         for &cell in &other.cavity {
-            for vertex in other.tetrahedra.cells[cell as usize].corners {
+            for vertex in other.cells.list[cell as usize].corners {
                 let label = &mut other.vertices[vertex as usize].label;
                 // A label may be stale: the list decides.
                 if vertex != INFINITE && seam.get(*label as usize) != Some(&vertex) {
@@ -80,7 +87,7 @@ impl Triangulation {
                     seam.push(vertex);
                 }
             }
-            other.tetrahedra.release(cell);
+            other.cells.release(cell);
         }
         seam.sort_unstable();
         let base = self.vertices.len() as u32;
@@ -91,9 +98,10 @@ impl Triangulation {
         }
         other.vertices[INFINITE as usize].label = INFINITE;
         for &facet in &other.boundary {
-            let corners = other.tetrahedra.cells[(facet >> 2) as usize].corners;
-            let facet = FACETS[(facet & 3) as usize].map(|k| corners[k]);
-            let (vertices, odd) = sorted(facet.map(|v| other.vertices[v as usize].label));
+            let corners = other.cells.list[(facet >> 2) as usize].corners;
+            let facet = Simplices::FACETS[(facet & 3) as usize];
+            let label = |k: usize| other.vertices[corners[facet[k]] as usize].label;
+            let (vertices, odd) = sorted(std::array::from_fn(label));
             border.push(Border { vertices, odd });
         }
         rounds::order(seam.len()).into_iter().map(|place| base + place).collect()
@@ -101,9 +109,9 @@ impl Triangulation {
 
     /// Removes the cells beyond the border, on the side of its final cells. Vertices from `base` on
     /// are the seam's.
-    fn cut(&mut self, mut border: Vec<Border>, base: u32) {
+    fn cut(&mut self, mut border: Vec<Border<D>>, base: u32) {
         border.sort_unstable_by_key(|facet| facet.vertices);
-        let beyond: Vec<u32> = (0..self.tetrahedra.cells.len())
+        let beyond: Vec<u32> = (0..self.cells.list.len())
             .into_par_iter()
             .flat_map_iter(|cell| self.facets_beyond(cell, &border, base))
             .collect();
@@ -112,13 +120,13 @@ impl Triangulation {
         let mut cells = Vec::new();
         for facet in beyond {
             let (cell, corner) = (facet >> 2, facet & 3);
-            self.tetrahedra.cells[cell as usize].neighbours[corner as usize] = NONE;
+            self.cells.list[cell as usize].neighbours[corner as usize] = NONE;
             cells.push(cell);
         }
         while let Some(cell) = cells.pop() {
-            if self.tetrahedra.marks[cell as usize] != Mark::Free {
-                self.tetrahedra.release(cell);
-                let facets = self.tetrahedra.cells[cell as usize].neighbours;
+            if self.cells.marks[cell as usize] != Mark::Free {
+                self.cells.release(cell);
+                let facets = self.cells.list[cell as usize].neighbours;
                 cells.extend(facets.iter().filter(|&&facet| facet != NONE).map(|facet| facet >> 2));
             }
         }
@@ -128,27 +136,34 @@ impl Triangulation {
     fn facets_beyond(
         &self,
         cell: usize,
-        border: &[Border],
+        border: &[Border<D>],
         base: u32,
     ) -> impl Iterator<Item = u32> {
-        let corners = self.tetrahedra.cells[cell].corners;
+        let corners = self.cells.list[cell].corners;
         let may_be = move |vertex: u32| vertex >= base || vertex == INFINITE;
         let count = corners.iter().filter(|&&vertex| may_be(vertex)).count();
-        let is_near = count >= 3 && self.tetrahedra.marks[cell] != Mark::Free;
+        let is_near = count >= D && self.cells.marks[cell] != Mark::Free;
         let is_beyond = move |corner: &usize| {
-            let facet = FACETS[*corner].map(|k| corners[k]);
-            let (vertices, odd) = sorted(facet);
+            let facet = Simplices::FACETS[*corner];
+            let (vertices, odd) = sorted(std::array::from_fn(|k| corners[facet[k]]));
             let found = || border.binary_search_by_key(&vertices, |facet| facet.vertices);
-            facet.into_iter().all(may_be) && found().is_ok_and(|at| border[at].odd == odd)
+            vertices.into_iter().all(may_be) && found().is_ok_and(|at| border[at].odd == odd)
         };
-        let corners = if is_near { 0..4 } else { 0..0 };
+        let corners = if is_near { 0..N } else { 0..0 };
         corners.filter(is_beyond).map(move |corner| (4 * cell + corner) as u32)
     }
 }
 
-/// Three vertices in ascending order, and whether this took an odd number of swaps.
-fn sorted([a, b, c]: [u32; 3]) -> ([u32; 3], bool) {
-    let mut sorted = [a, b, c];
-    sorted.sort_unstable();
-    (sorted, (a > b) ^ (b > c) ^ (a > c))
+/// Vertices in ascending order, and whether this took an odd number of swaps.
+fn sorted<const D: usize>(mut vertices: [u32; D]) -> ([u32; D], bool) {
+    let mut odd = false;
+    for end in (1..D).rev() {
+        for k in 0..end {
+            if vertices[k] > vertices[k + 1] {
+                vertices.swap(k, k + 1);
+                odd = !odd;
+            }
+        }
+    }
+    (vertices, odd)
 }

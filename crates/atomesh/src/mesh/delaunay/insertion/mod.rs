@@ -1,4 +1,6 @@
-//! Tetrahedra by incremental insertion (Bowyer 1981, Watson 1981).
+//! Triangles and tetrahedra by incremental insertion (Bowyer 1981, Watson 1981): one source for both.
+//!
+//! In the plane read line for plane, edge for facet, circle for sphere.
 //!
 //! 1. Planes divide the points into a part for each thread ([`split`]); parts work alone ([`part`]).
 //! 2. Points come in rounds, each about eight times the one before, along a Hilbert curve within a
@@ -21,6 +23,7 @@
 //! of the in-sphere test what is truly zero ([`predicates`]). Orientation is never perturbed.
 
 mod cavity;
+mod dimension;
 mod fill;
 mod fixed;
 mod join;
@@ -38,10 +41,11 @@ use super::prepare::Prepared;
 use super::{STRIDE, canonical, rounds};
 use crate::parallel::prelude::*;
 use crate::watch::{Cancelled, Watch};
+pub(super) use dimension::{Dimension, Simplices};
 use fill::Rim;
 use part::Part;
 use predicates::Predicates;
-use storage::{Mark, Tetrahedra, Vertex};
+use storage::{Cells, Mark, Vertex};
 
 /// Least number of points in a part: smaller parts would be mostly seam.
 const LEAST_PART: usize = 4096;
@@ -53,25 +57,31 @@ const MOST_PARTS: usize = 16;
 const GROWTH: f64 = 0.9;
 
 /// See [`super::Connector`].
-pub(super) fn connect(
-    prepared: &Prepared<3>,
+pub(super) fn connect<const D: usize, const N: usize>(
+    prepared: &Prepared<D>,
     watch: &mut dyn Watch,
-) -> Result<Option<Vec<u32>>, Cancelled> {
+) -> Result<Option<Vec<u32>>, Cancelled>
+where
+    Simplices: Dimension<D, N>,
+{
     let most = (prepared.points.len() / LEAST_PART).min(MOST_PARTS);
     connect_in_parts(prepared, rayon::current_num_threads().min(most), watch)
 }
 
 /// Connects points divided into at most `part_count` parts.
-pub(super) fn connect_in_parts(
-    prepared: &Prepared<3>,
+pub(super) fn connect_in_parts<const D: usize, const N: usize>(
+    prepared: &Prepared<D>,
     part_count: usize,
     watch: &mut dyn Watch,
-) -> Result<Option<Vec<u32>>, Cancelled> {
+) -> Result<Option<Vec<u32>>, Cancelled>
+where
+    Simplices: Dimension<D, N>,
+{
     let points = &prepared.points;
     let predicates = Predicates::of(points);
     let start = |ranks: &Vec<u32>| Part::new(points, ranks, rounds::order(ranks.len()), predicates);
     let whole = || (0..points.len() as u32).collect::<Vec<u32>>();
-    let parts: Option<Vec<Part>> =
+    let parts: Option<Vec<Part<D, N>>> =
         split::split(points, whole(), part_count).par_iter().map(start).collect();
     // Points of a part may lie on one plane when others do not.
     match parts.or_else(|| start(&whole()).map(|part| vec![part])) {
@@ -82,11 +92,14 @@ pub(super) fn connect_in_parts(
 
 /// Inserts the points one by one in the given order: the reference for insertion by parts.
 #[cfg(test)]
-pub(super) fn connect_in_order(
-    points: &[crate::geometry::Point<3>],
+pub(super) fn connect_in_order<const D: usize, const N: usize>(
+    points: &[crate::geometry::Point<D>],
     order: Vec<u32>,
     watch: &mut dyn Watch,
-) -> Result<Option<Vec<u32>>, Cancelled> {
+) -> Result<Option<Vec<u32>>, Cancelled>
+where
+    Simplices: Dimension<D, N>,
+{
     let ranks: Vec<u32> = (0..points.len() as u32).collect();
     match Part::new(points, &ranks, order, Predicates::of(points)) {
         Some(part) => connect_parts(vec![part], &ranks, watch).map(Some),
@@ -94,11 +107,14 @@ pub(super) fn connect_in_order(
     }
 }
 
-fn connect_parts(
-    mut parts: Vec<Part>,
+fn connect_parts<const D: usize, const N: usize>(
+    mut parts: Vec<Part<D, N>>,
     order: &[u32],
     watch: &mut dyn Watch,
-) -> Result<Vec<u32>, Cancelled> {
+) -> Result<Vec<u32>, Cancelled>
+where
+    Simplices: Dimension<D, N>,
+{
     let share = if parts.len() == 1 { 1.0 } else { GROWTH };
     part::grow(&mut parts, share, watch)?;
     let triangulations = join::join(parts, share, watch)?;
@@ -108,11 +124,11 @@ fn connect_parts(
     Ok(corners)
 }
 
-/// The Delaunay tetrahedra of the points inserted so far.
-struct Triangulation {
+/// The Delaunay cells of the points inserted so far.
+struct Triangulation<const D: usize, const N: usize> {
     /// The infinite vertex, then the points: those of a part in prepared order.
-    vertices: Vec<Vertex>,
-    tetrahedra: Tetrahedra,
+    vertices: Vec<Vertex<D>>,
+    cells: Cells<N>,
     predicates: Predicates,
     /// Where the next walk starts.
     hint: u32,
@@ -122,16 +138,19 @@ struct Triangulation {
     candidates: Vec<(u32, f64)>,
     /// The facets around the cavity, as seen from the cells that stay.
     boundary: Vec<u32>,
-    rim: Rim,
+    rim: Rim<N>,
 }
 
-impl Triangulation {
-    /// The triangulation of four vertices that span a positive cell.
-    fn new(vertices: Vec<Vertex>, first: [u32; 4], predicates: Predicates) -> Self {
-        let tetrahedra = start::first_cells(first, vertices.len());
+impl<const D: usize, const N: usize> Triangulation<D, N>
+where
+    Simplices: Dimension<D, N>,
+{
+    /// The triangulation of vertices that span a positive cell.
+    fn new(vertices: Vec<Vertex<D>>, first: [u32; N], predicates: Predicates) -> Self {
+        let cells = start::first_cells(first, vertices.len());
         Self {
             vertices,
-            tetrahedra,
+            cells,
             predicates,
             hint: 0,
             cavity: Vec::new(),
@@ -149,15 +168,15 @@ impl Triangulation {
     }
 }
 
-impl canonical::CellSource<4> for Triangulation {
+impl<const D: usize, const N: usize> canonical::CellSource<N> for Triangulation<D, N> {
     fn place_count(&self) -> usize {
-        self.tetrahedra.cells.len()
+        self.cells.list.len()
     }
 
     #[inline]
-    fn corners(&self, place: usize) -> Option<[u32; 4]> {
-        let cell = &self.tetrahedra.cells[place];
-        let is_finite = self.tetrahedra.marks[place] != Mark::Free && !cell.is_infinite();
+    fn corners(&self, place: usize) -> Option<[u32; N]> {
+        let cell = &self.cells.list[place];
+        let is_finite = self.cells.marks[place] != Mark::Free && !cell.is_infinite();
         is_finite.then(|| cell.corners.map(|vertex| self.vertices[vertex as usize].rank))
     }
 }

@@ -8,10 +8,6 @@ use crate::geometry::Point;
 /// The vertex at infinity. In an infinite cell it is the last corner.
 pub(super) const INFINITE: u32 = 0;
 
-/// For each corner, the corners of the opposite facet, such that facet and corner, in this order,
-/// are positive.
-pub(super) const FACETS: [[usize; 3]; 4] = [[1, 3, 2], [0, 2, 3], [0, 3, 1], [0, 1, 2]];
-
 /// What is known of a cell while a point is inserted.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(super) enum Mark {
@@ -30,8 +26,8 @@ pub(super) enum Mark {
 /// A point, its rank in the prepared order, and a label for temporary use.
 #[derive(Clone, Copy, Debug)]
 #[repr(align(32))]
-pub(super) struct Vertex {
-    pub at: Point<3>,
+pub(super) struct Vertex<const D: usize> {
+    pub at: Point<D>,
     pub rank: u32,
     /// Where the vertex stood in the latest list that it was in; see [`super::fill`].
     pub label: u32,
@@ -40,29 +36,35 @@ pub(super) struct Vertex {
 /// The corners of a cell and, opposite to each, the facet of the neighbour.
 #[derive(Clone, Copy, Debug)]
 #[repr(align(32))]
-pub(super) struct Tetrahedron {
-    pub corners: [u32; 4],
-    pub neighbours: [u32; 4],
+pub(super) struct Cell<const N: usize> {
+    pub corners: [u32; N],
+    pub neighbours: [u32; N],
 }
 
-impl Tetrahedron {
+impl<const N: usize> Cell<N> {
     #[inline]
     pub fn is_infinite(&self) -> bool {
-        self.corners[3] == INFINITE
+        self.corners[N - 1] == INFINITE
+    }
+
+    /// Of an infinite cell: the finite one behind its facet.
+    #[inline]
+    pub fn behind(&self) -> u32 {
+        self.neighbours[N - 1] >> 2
     }
 }
 
 /// All cells, finite and infinite.
 #[derive(Debug, Default)]
-pub(super) struct Tetrahedra {
-    pub cells: Vec<Tetrahedron>,
+pub(super) struct Cells<const N: usize> {
+    pub list: Vec<Cell<N>>,
     pub marks: Vec<Mark>,
     free: Vec<u32>,
 }
 
-impl Tetrahedra {
+impl<const N: usize> Cells<N> {
     pub fn with_capacity(cells: usize) -> Self {
-        Self { cells: Vec::with_capacity(cells), marks: Vec::with_capacity(cells), free: vec![] }
+        Self { list: Vec::with_capacity(cells), marks: Vec::with_capacity(cells), free: vec![] }
     }
 
     /// A place for a cell, to be overwritten.
@@ -71,9 +73,9 @@ impl Tetrahedra {
         if let Some(place) = self.free.pop() {
             return place;
         }
-        self.cells.push(Tetrahedron { corners: [0; 4], neighbours: [0; 4] });
+        self.list.push(Cell { corners: [0; N], neighbours: [0; N] });
         self.marks.push(Mark::Unseen);
-        (self.cells.len() - 1) as u32
+        (self.list.len() - 1) as u32
     }
 
     #[inline]

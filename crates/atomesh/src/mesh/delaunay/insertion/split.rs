@@ -1,4 +1,4 @@
-//! Dividing points into parts by planes.
+//! Dividing points into parts by planes: by lines in the plane.
 
 use crate::geometry::{Bounds, Point};
 use crate::parallel::prelude::*;
@@ -10,7 +10,11 @@ const SAMPLE: usize = 1 << 14;
 /// points.
 ///
 /// The boxes of the parts do not meet. Each part keeps the order of the ranks.
-pub(super) fn split(points: &[Point<3>], ranks: Vec<u32>, part_count: usize) -> Vec<Vec<u32>> {
+pub(super) fn split<const D: usize>(
+    points: &[Point<D>],
+    ranks: Vec<u32>,
+    part_count: usize,
+) -> Vec<Vec<u32>> {
     if part_count < 2 {
         return vec![ranks];
     }
@@ -31,10 +35,14 @@ pub(super) fn split(points: &[Point<3>], ranks: Vec<u32>, part_count: usize) -> 
 
 /// Divides points by a plane across the longest side of their box, the given share below it; `None` if no
 /// such plane leaves points on both sides.
-fn divide(points: &[Point<3>], ranks: &[u32], share: f64) -> Option<(Vec<u32>, Vec<u32>)> {
+fn divide<const D: usize>(
+    points: &[Point<D>],
+    ranks: &[u32],
+    share: f64,
+) -> Option<(Vec<u32>, Vec<u32>)> {
     let at = |rank: &u32| &points[*rank as usize];
     let extent = bounds(points, ranks)?.extent();
-    let axis = (0..3).max_by(|&i, &j| extent[i].total_cmp(&extent[j]))?;
+    let axis = (0..D).max_by(|&i, &j| extent[i].total_cmp(&extent[j]))?;
     let stride = ranks.len().div_ceil(SAMPLE);
     let mut sample: Vec<f64> = ranks.iter().step_by(stride).map(|rank| at(rank)[axis]).collect();
     let place = ((share * sample.len() as f64) as usize).min(sample.len() - 1);
@@ -66,14 +74,14 @@ fn divide(points: &[Point<3>], ranks: &[u32], share: f64) -> Option<(Vec<u32>, V
 }
 
 /// The box of the points with these ranks; `None` if there are none.
-fn bounds(points: &[Point<3>], ranks: &[u32]) -> Option<Bounds<3>> {
+fn bounds<const D: usize>(points: &[Point<D>], ranks: &[u32]) -> Option<Bounds<D>> {
     let of = |ranks: &[u32]| {
         let first = &points[*ranks.first()? as usize];
         let mut bounds = Bounds { min: *first, max: *first };
         ranks.iter().for_each(|rank| bounds.include(&points[*rank as usize]));
         Some(bounds)
     };
-    let both = |mut a: Bounds<3>, b: Bounds<3>| {
+    let both = |mut a: Bounds<D>, b: Bounds<D>| {
         a.include(&b.min);
         a.include(&b.max);
         a
@@ -122,6 +130,6 @@ mod tests {
     fn points_on_one_plane_across_their_longest_side_stay_together() {
         let points = [[0.0, 0.0, 1.0]; 3];
         assert_eq!(split(&points, vec![0, 1, 2], 4), [vec![0, 1, 2]]);
-        assert!(split(&[], vec![], 4).concat().is_empty());
+        assert!(split::<3>(&[], vec![], 4).concat().is_empty());
     }
 }

@@ -7,7 +7,10 @@ use crate::mesh::{Delaunay, merge_duplicates};
 use crate::watch::Silent;
 use proptest::prelude::*;
 
-fn assert_parts_change_nothing(points: &[Point<3>], what: &str) {
+fn assert_parts_change_nothing<const D: usize, const N: usize>(points: &[Point<D>], what: &str)
+where
+    Simplices: Dimension<D, N>,
+{
     let prepared = Prepared::new(points).unwrap();
     let connected = |parts| connect_in_parts(&prepared, parts, &mut Silent).unwrap();
     let expected = connected(1);
@@ -17,15 +20,17 @@ fn assert_parts_change_nothing(points: &[Point<3>], what: &str) {
 }
 
 /// The cavity and the facets around it, in no order.
-fn found(triangulation: &Triangulation) -> [Vec<u32>; 2] {
+fn found<const D: usize, const N: usize>(triangulation: &Triangulation<D, N>) -> [Vec<u32>; 2] {
     let mut found = [triangulation.cavity.clone(), triangulation.boundary.clone()];
     found.iter_mut().for_each(|list| list.sort_unstable());
     found
 }
 
-#[test]
-fn digging_finds_what_a_plain_search_finds() {
-    for points in [face_centered(4), jittered(&face_centered(4), 0.1), scatter(400, 20)] {
+fn digging_finds_what_a_plain_search_finds<const D: usize, const N: usize>(sets: [Vec<Point<D>>; 3])
+where
+    Simplices: Dimension<D, N>,
+{
+    for points in sets {
         let points = scaled(&points, 1.0 / 8.0);
         let ranks: Vec<u32> = (0..points.len() as u32).collect();
         let mut order = ranks.clone();
@@ -40,7 +45,7 @@ fn digging_finds_what_a_plain_search_finds() {
             let holder = triangulation.locate(&p);
             triangulation.spread([holder], |triangulation, cell| triangulation.conflicts(cell, &p));
             let expected = found(triangulation);
-            triangulation.tetrahedra.marks.iter_mut().for_each(|mark| {
+            triangulation.cells.marks.iter_mut().for_each(|mark| {
                 *mark = if *mark == Mark::Free { Mark::Free } else { Mark::Unseen };
             });
             triangulation.dig(&p, holder);
@@ -51,48 +56,87 @@ fn digging_finds_what_a_plain_search_finds() {
 }
 
 #[test]
-fn crystals_connect_alike_in_parts() {
-    for (points, what) in [
-        (cubic(7), "cubic"),
-        (body_centered(5), "body-centred"),
-        (face_centered(4), "face-centred"),
-    ] {
-        for scale in [1.0, 0.1, 1e9, 1e-9] {
-            let points = scaled(&points, scale);
-            assert_parts_change_nothing(&points, &format!("{what} times {scale}"));
-        }
-        let turned: Vec<Point<3>> = points
-            .iter()
-            .map(|p| [0.8 * p[0] - 0.6 * p[1], 0.6 * p[0] + 0.8 * p[1], p[2]])
-            .collect();
-        assert_parts_change_nothing(&turned, &format!("{what}, turned"));
-        for amount in [0.1, 1e-9, 1e-15] {
-            let jittered = jittered(&points, amount);
-            assert_parts_change_nothing(&jittered, &format!("{what}, jittered by {amount}"));
-        }
+fn digging_finds_what_a_plain_search_finds_in_2_d_and_3_d() {
+    digging_finds_what_a_plain_search_finds([
+        square(15),
+        jittered(&square(15), 0.1),
+        scatter::<2>(400, 20),
+    ]);
+    digging_finds_what_a_plain_search_finds([
+        face_centered(4),
+        jittered(&face_centered(4), 0.1),
+        scatter::<3>(400, 20),
+    ]);
+}
+
+fn crystal_connects_alike_in_parts<const D: usize, const N: usize>(
+    points: Vec<Point<D>>,
+    what: &str,
+) where
+    Simplices: Dimension<D, N>,
+{
+    for scale in [1.0, 0.1, 1e9, 1e-9] {
+        let points = scaled(&points, scale);
+        assert_parts_change_nothing(&points, &format!("{what} times {scale}"));
+    }
+    let turn = |p: &Point<D>| {
+        let mut turned = *p;
+        (turned[0], turned[1]) = (0.8 * p[0] - 0.6 * p[1], 0.6 * p[0] + 0.8 * p[1]);
+        turned
+    };
+    let turned: Vec<Point<D>> = points.iter().map(turn).collect();
+    assert_parts_change_nothing(&turned, &format!("{what}, turned"));
+    for amount in [0.1, 1e-9, 1e-15] {
+        let jittered = jittered(&points, amount);
+        assert_parts_change_nothing(&jittered, &format!("{what}, jittered by {amount}"));
     }
 }
 
 #[test]
-fn clouds_connect_alike_in_parts() {
-    let cloud = scatter::<3>(3000, 21);
+fn crystals_connect_alike_in_parts() {
+    crystal_connects_alike_in_parts(square(20), "square");
+    crystal_connects_alike_in_parts(hexagonal(12), "hexagonal");
+    crystal_connects_alike_in_parts(cubic(7), "cubic");
+    crystal_connects_alike_in_parts(body_centered(5), "body-centred");
+    crystal_connects_alike_in_parts(face_centered(4), "face-centred");
+}
+
+fn clouds_connect_alike_in_parts<const D: usize, const N: usize>()
+where
+    Simplices: Dimension<D, N>,
+{
+    let cloud = scatter::<D>(3000, 21);
     assert_parts_change_nothing(&cloud, "scattered");
-    let changed = |change: &dyn Fn(&Point<3>) -> Point<3>| cloud.iter().map(change).collect();
-    let long: Vec<_> = changed(&|p| [1e4 * p[0], p[1], 1e-3 * p[2]]);
+    let changed = |change: &dyn Fn(&Point<D>) -> Point<D>| cloud.iter().map(change).collect();
+    let stretched = |p: &Point<D>| std::array::from_fn(|k| p[k] * [1e4, 1.0, 1e-3][k]);
+    let long: Vec<_> = changed(&stretched);
     assert_parts_change_nothing(&long, "long");
     let graded: Vec<_> = changed(&|p| p.map(|x| x.powi(8)));
     assert_parts_change_nothing(&graded, "graded");
     let clusters: Vec<_> = changed(&|p| p.map(|x| (4.0 * x).floor() + 1e-3 * x));
     assert_parts_change_nothing(&clusters, "clustered");
-    let plates: Vec<_> = changed(&|p| [p[0], p[1], (3.0 * p[2]).floor()]);
+    let layer = |p: &Point<D>| {
+        let mut layer = *p;
+        layer[D - 1] = (3.0 * layer[D - 1]).floor();
+        layer
+    };
+    let plates: Vec<_> = changed(&layer);
     assert_parts_change_nothing(&plates, "on three planes");
     let coarse: Vec<_> = changed(&|p| p.map(|x| (20.0 * x).floor()));
     assert_parts_change_nothing(&merge_duplicates(&coarse).0, "small integers");
 }
 
 #[test]
+fn clouds_connect_alike_in_parts_in_2_d_and_3_d() {
+    clouds_connect_alike_in_parts::<2, 3>();
+    clouds_connect_alike_in_parts::<3, 4>();
+}
+
+#[test]
 fn surfaces_connect_alike_in_parts() {
     // Every circumsphere of an even ball holds points of all parts but for ties: all is seam.
+    let disc = scatter::<1>(800, 22).into_iter().map(|[x]| (6.3 * x).sin_cos());
+    assert_parts_change_nothing(&disc.map(<[f64; 2]>::from).collect::<Vec<_>>(), "a disc");
     assert_parts_change_nothing(&on_the_unit_sphere(800, 22), "a ball");
     assert_parts_change_nothing(&cospherical_integers(), "exactly cospherical");
     let hull: Vec<_> =
@@ -115,32 +159,45 @@ fn parts_on_one_plane_are_connected_whole() {
     assert_parts_change_nothing(&cubic(1), "a cube");
     let prepared = Prepared::new(&square).unwrap();
     assert_eq!(connect_in_parts(&prepared, 2, &mut Silent), Ok(None));
+    // a line divides these into points on one line each
+    let two: Vec<Point<2>> = (0..60).map(|k| [f64::from(k % 2), 0.01 * f64::from(k)]).collect();
+    assert_parts_change_nothing(&two, "two lines");
+}
+
+fn connects_alike_in_parts<const D: usize, const N: usize>(points: &[Point<D>], parts: usize)
+where
+    Simplices: Dimension<D, N>,
+{
+    if let Ok(prepared) = Prepared::new(points) {
+        let connected = |parts| connect_in_parts(&prepared, parts, &mut Silent);
+        assert_eq!(connected(parts), connected(1));
+    }
 }
 
 proptest! {
     #[test]
-    fn small_integers_connect_alike_in_parts(
+    fn small_integers_in_the_plane_connect_alike_in_parts(
+        points in small_integers::<2>(), parts in 2_usize..6
+    ) {
+        connects_alike_in_parts(&points, parts);
+    }
+
+    #[test]
+    fn small_integers_in_space_connect_alike_in_parts(
         points in small_integers::<3>(), parts in 2_usize..6
     ) {
-        if let Ok(prepared) = Prepared::new(&points) {
-            prop_assert_eq!(
-                connect_in_parts(&prepared, parts, &mut Silent),
-                connect_in_parts(&prepared, 1, &mut Silent)
-            );
-        }
+        connects_alike_in_parts(&points, parts);
     }
 }
 
-#[test]
-fn cells_are_the_same_at_any_thread_count() {
-    // Enough points for a part to each of four threads.
-    let many = 5 * LEAST_PART;
-    let side = (many as f64 / 4.0).cbrt() as usize;
-    let sets = [scatter::<3>(many, 25), face_centered(side), jittered(&face_centered(side), 0.1)];
+fn cells_are_the_same_at_any_thread_count<const D: usize>(
+    delaunay: Delaunay<D>,
+    sets: &[Vec<Point<D>>],
+) {
     for points in sets {
         let connected = |threads| {
             let pool = rayon::ThreadPoolBuilder::new().num_threads(threads).build().unwrap();
-            pool.install(|| Delaunay::<3>::new().connect(&points, &mut Silent)).unwrap()
+            pool.install(|| delaunay.connect(points, &mut Silent)).unwrap()
         };
         let expected = connected(1);
         expected.validate().unwrap();
@@ -152,8 +209,20 @@ fn cells_are_the_same_at_any_thread_count() {
 }
 
 #[test]
+fn cells_are_the_same_at_any_thread_count_in_2_d_and_3_d() {
+    // Enough points for a part to each of four threads.
+    let many = 5 * LEAST_PART;
+    let side = (many as f64).sqrt() as usize;
+    let sets = [scatter::<2>(many, 25), square(side), jittered(&square(side), 0.1)];
+    cells_are_the_same_at_any_thread_count(Delaunay::<2>::new(), &sets);
+    let side = (many as f64 / 4.0).cbrt() as usize;
+    let sets = [scatter::<3>(many, 25), face_centered(side), jittered(&face_centered(side), 0.1)];
+    cells_are_the_same_at_any_thread_count(Delaunay::<3>::new(), &sets);
+}
+
+#[test]
 fn a_watch_ends_parts_at_any_step() {
-    let prepared = Prepared::new(&scatter::<3>(12_000, 26)).unwrap();
+    let prepared = Prepared::<3>::new(&scatter(12_000, 26)).unwrap();
     // One step while the parts grow, one as they are joined.
     for steps in 1..=2 {
         let found = connect_in_parts(&prepared, 3, &mut Stop(steps));

@@ -1,21 +1,24 @@
 //! The cells in conflict with a point.
 
 use super::Triangulation;
-use super::predicates::rounded_in_sphere;
-use super::storage::{Mark, Tetrahedra, Tetrahedron};
+use super::dimension::{Dimension, Simplices};
+use super::storage::{Cell, Cells, Mark};
 use crate::geometry::Point;
 use std::ops::Range;
 
-impl Triangulation {
+impl<const D: usize, const N: usize> Triangulation<D, N>
+where
+    Simplices: Dimension<D, N>,
+{
     /// Finds all cells in conflict with `p`, from the one that holds it, and the facets around them.
     ///
     /// Works from the cells of one step to all their neighbours at once. Whether a cell is in conflict
     /// cannot be predicted: without a branch on it the processor works on many at a time.
-    pub(super) fn dig(&mut self, p: &Point<3>, holder: u32) {
-        debug_assert!(self.conflicts(&self.tetrahedra.cells[holder as usize], p));
+    pub(super) fn dig(&mut self, p: &Point<D>, holder: u32) {
+        debug_assert!(self.conflicts(&self.cells.list[holder as usize], p));
         self.cavity.clear();
         self.cavity.push(holder);
-        self.tetrahedra.marks[holder as usize] = Mark::Conflict;
+        self.cells.marks[holder as usize] = Mark::Conflict;
         let mut start = 0;
         while start < self.cavity.len() {
             let end = self.cavity.len();
@@ -27,12 +30,12 @@ impl Triangulation {
 
     /// Adds to the cavity the neighbours of some of its cells that are in conflict with `p`.
     #[inline]
-    fn test_neighbours(&mut self, steps: Range<usize>, p: &Point<3>) {
-        let Tetrahedra { cells, marks, .. } = &mut self.tetrahedra;
-        self.candidates.resize(self.candidates.len().max(4 * steps.len()), (0, 0.0));
+    fn test_neighbours(&mut self, steps: Range<usize>, p: &Point<D>) {
+        let Cells { list, marks, .. } = &mut self.cells;
+        self.candidates.resize(self.candidates.len().max(N * steps.len()), (0, 0.0));
         let mut count = 0;
         for &cell in &self.cavity[steps] {
-            for facet in cells[cell as usize].neighbours {
+            for facet in list[cell as usize].neighbours {
                 let mark = &mut marks[(facet >> 2) as usize];
                 self.candidates[count].0 = facet >> 2;
                 count += usize::from(*mark == Mark::Unseen);
@@ -40,20 +43,20 @@ impl Triangulation {
             }
         }
         for (cell, rounded) in &mut self.candidates[..count] {
-            let corners = cells[*cell as usize].corners;
-            *rounded = rounded_in_sphere(corners.map(|v| &self.vertices[v as usize].at), p);
+            let corners = list[*cell as usize].corners;
+            let corners = corners.map(|v| &self.vertices[v as usize].at);
+            *rounded = Simplices::rounded_in_sphere(corners, p);
         }
         let mut end = self.cavity.len();
         self.cavity.resize(end + count, 0);
         for at in 0..count {
             let (cell, rounded) = self.candidates[at];
-            let here = &self.tetrahedra.cells[cell as usize];
+            let here = &self.cells.list[cell as usize];
             let conflict = match self.predicates.in_sphere_if_clear(rounded) {
                 Some(inside) if !here.is_infinite() => inside,
                 _ => self.conflicts(here, p),
             };
-            self.tetrahedra.marks[cell as usize] =
-                if conflict { Mark::Conflict } else { Mark::Kept };
+            self.cells.marks[cell as usize] = if conflict { Mark::Conflict } else { Mark::Kept };
             self.cavity[end] = cell;
             end += usize::from(conflict);
         }
@@ -63,12 +66,12 @@ impl Triangulation {
     /// Finds the facets around the cavity.
     #[inline]
     fn surround(&mut self) {
-        self.boundary.resize(4 * self.cavity.len(), 0);
+        self.boundary.resize(N * self.cavity.len(), 0);
         let mut count = 0;
         for &cell in &self.cavity {
-            for facet in self.tetrahedra.cells[cell as usize].neighbours {
+            for facet in self.cells.list[cell as usize].neighbours {
                 self.boundary[count] = facet;
-                count += usize::from(self.tetrahedra.marks[(facet >> 2) as usize] == Mark::Kept);
+                count += usize::from(self.cells.marks[(facet >> 2) as usize] == Mark::Kept);
             }
         }
         self.boundary.truncate(count);
@@ -80,30 +83,30 @@ impl Triangulation {
     pub(super) fn spread(
         &mut self,
         from: impl IntoIterator<Item = u32>,
-        conflicts: impl Fn(&Self, &Tetrahedron) -> bool,
+        conflicts: impl Fn(&Self, &Cell<N>) -> bool,
     ) {
         self.boundary.clear();
         self.cavity.clear();
         for cell in from {
-            if self.tetrahedra.marks[cell as usize] != Mark::Conflict {
-                self.tetrahedra.marks[cell as usize] = Mark::Conflict;
+            if self.cells.marks[cell as usize] != Mark::Conflict {
+                self.cells.marks[cell as usize] = Mark::Conflict;
                 self.cavity.push(cell);
             }
         }
         let mut next = 0;
         while let Some(&cell) = self.cavity.get(next) {
             next += 1;
-            for facet in self.tetrahedra.cells[cell as usize].neighbours {
+            for facet in self.cells.list[cell as usize].neighbours {
                 let neighbour = (facet >> 2) as usize;
-                match self.tetrahedra.marks[neighbour] {
+                match self.cells.marks[neighbour] {
                     Mark::Conflict => {}
                     Mark::Kept => self.boundary.push(facet),
-                    _ if conflicts(self, &self.tetrahedra.cells[neighbour]) => {
-                        self.tetrahedra.marks[neighbour] = Mark::Conflict;
+                    _ if conflicts(self, &self.cells.list[neighbour]) => {
+                        self.cells.marks[neighbour] = Mark::Conflict;
                         self.cavity.push(neighbour as u32);
                     }
                     _ => {
-                        self.tetrahedra.marks[neighbour] = Mark::Kept;
+                        self.cells.marks[neighbour] = Mark::Kept;
                         self.boundary.push(facet);
                     }
                 }
@@ -112,22 +115,23 @@ impl Triangulation {
     }
 
     /// Whether the circumsphere of the cell holds `p`. That of an infinite cell is the open half
-    /// space beyond its facet and, in the facet's plane, the circle around it: the circle that the
-    /// plane cuts from the circumsphere of the finite cell behind, perturbed or not.
-    pub(super) fn conflicts(&self, cell: &Tetrahedron, p: &Point<3>) -> bool {
-        let at = |k: usize| &self.vertices[cell.corners[k] as usize].at;
+    /// space beyond its facet and, in the facet's plane, the sphere around it: what the plane cuts from the
+    /// circumsphere of the finite cell behind, perturbed or not.
+    pub(super) fn conflicts(&self, cell: &Cell<N>, p: &Point<D>) -> bool {
+        let mut corners = cell.corners.map(|vertex| &self.vertices[vertex as usize].at);
         if !cell.is_infinite() {
-            return self.predicates.in_sphere([at(0), at(1), at(2), at(3)], p);
+            return self.predicates.in_sphere(corners, p);
         }
-        let side = self.predicates.orientation([at(0), at(1), at(2), p]);
+        corners[D] = p;
+        let side = self.predicates.orientation(corners);
         if side != 0.0 {
             return side > 0.0;
         }
-        let behind = (cell.neighbours[3] >> 2) as usize;
-        match self.tetrahedra.marks[behind] {
+        let behind = cell.behind() as usize;
+        match self.cells.marks[behind] {
             Mark::Conflict => true,
             Mark::Kept => false,
-            _ => self.conflicts(&self.tetrahedra.cells[behind], p),
+            _ => self.conflicts(&self.cells.list[behind], p),
         }
     }
 }
