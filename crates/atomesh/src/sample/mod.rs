@@ -23,7 +23,7 @@ use crate::image::{Frame, Image, Samples, Units};
 use crate::parallel::prelude::*;
 use crate::watch::{Cancelled, Phase, Watch, check};
 pub use cells::CellSurfaces;
-pub(crate) use clip::Axis;
+use clip::Axis;
 use overlap::{Overlaps, Surface};
 use statistic::Tally;
 pub use statistic::{Statistic, UnknownStatistic};

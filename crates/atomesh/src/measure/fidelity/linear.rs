@@ -12,6 +12,7 @@ use crate::parallel::prelude::*;
 use super::PlacedMesh;
 use crate::geometry::linear::invert;
 use crate::geometry::{Point, difference, dot};
+use crate::image::Samples;
 use crate::measure::MeasureError;
 use crate::measure::statistics::{sum, sums};
 use crate::mesh::{CellsOfPoints, Mesh};
@@ -63,9 +64,9 @@ struct Block<'a> {
 }
 
 impl<'a, const D: usize> System<'a, D> {
-    /// Gathers the samples in each cell; `mean` is taken off their values, so that squares keep their digits.
-    pub fn new(placed: &PlacedMesh<'a, D>, mean: f64) -> Self {
-        let mesh = placed.mesh;
+    /// Gathers the samples in each cell. The mean of all is taken off their values, so that squares keep their digits.
+    pub fn new(placed: &PlacedMesh<'a, D>) -> Self {
+        let (mesh, mean) = (placed.mesh, finite_mean(placed.samples));
         let (width, count) = (D + 1, mesh.cell_count());
         let mut matrices = vec![0.0; count * width * width];
         let mut rights = vec![0.0; count * width];
@@ -92,6 +93,35 @@ impl<'a, const D: usize> System<'a, D> {
         }
         let cells_of_points = mesh.cells_of_points();
         Self { mesh, cells_of_points, matrices, rights, weight, squares }
+    }
+
+    /// Σ w: how much of the image, in boxes of samples, has cells.
+    pub fn weight(&self) -> f64 {
+        self.weight
+    }
+
+    /// The equations of a cell, summed over its corners: Σ w and Σ w v, as barycentric coordinates sum up to 1.
+    fn sums_of(&self, cell: usize) -> [f64; 2] {
+        let width = D + 1;
+        let matrix = &self.matrices[cell * width * width..(cell + 1) * width * width];
+        let right = &self.rights[cell * width..(cell + 1) * width];
+        [matrix.iter().sum(), right.iter().sum()]
+    }
+
+    /// The root mean square of what the means of cells leave.
+    pub fn constant_rms(&self) -> f64 {
+        let cells = self.mesh.cell_count();
+        let explained = sum(0..cells, &|cell| {
+            let [weight, value] = self.sums_of(cell);
+            if weight > 0.0 { value * value / weight } else { 0.0 }
+        });
+        ((self.squares - explained) / self.weight).max(0.0).sqrt()
+    }
+
+    /// The standard deviation of all samples.
+    pub fn deviation(&self) -> f64 {
+        let value = sum(0..self.mesh.cell_count(), &|cell| self.sums_of(cell)[1]);
+        (self.squares / self.weight - (value / self.weight).powi(2)).max(0.0).sqrt()
     }
 
     /// The entries of a point: the cell, and which of its corners the point is.
@@ -149,7 +179,8 @@ impl<'a, const D: usize> System<'a, D> {
         let mut size = inner(&residual, &direction);
         let (first, mut iterations) = (size, 0);
         while size > ENOUGH * ENOUGH * first && iterations < MOST_ITERATIONS {
-            check(watch, Phase::Measure, 0.7 + 0.3 * (iterations as f64 / 200.0), None)?;
+            let done = iterations as f64 / MOST_ITERATIONS as f64;
+            check(watch, Phase::Measure, 0.5 + 0.5 * done, None)?;
             let image = self.product(&direction);
             let curvature = inner(&direction, &image);
             if curvature.is_nan() || curvature <= 0.0 {
@@ -175,6 +206,15 @@ impl<'a, const D: usize> System<'a, D> {
             converged: size <= ENOUGH * ENOUGH * first,
         })
     }
+}
+
+/// The mean of the finite samples; 0 if there are none.
+fn finite_mean(samples: &Samples) -> f64 {
+    let [total, count] = sums(0..samples.len(), &|i| {
+        let value = samples.get(i);
+        if value.is_finite() { [value, 1.0] } else { [0.0; 2] }
+    });
+    if count > 0.0 { total / count } else { 0.0 }
 }
 
 /// A sample on a facet of a cell.

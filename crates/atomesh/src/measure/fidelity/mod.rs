@@ -1,16 +1,15 @@
 //! How well a mesh can carry its image: the error that is left when the image is rebuilt from the mesh.
 //!
-//! *Piecewise constant*: each cell has the mean of the samples that it overlaps, weighted by overlap
-//! ([`crate::sample`]). *Piecewise linear*: continuous, with a value at each point such that the squared
-//! differences at the samples are least (linear least squares; not the image's values at the points, which noise
-//! would spoil). Each sample counts by its box, cut at the image's rim. Both errors are root mean squares over the
-//! part of the image that the mesh covers.
+//! *Piecewise constant*: each cell has the mean of its samples. *Piecewise linear*: continuous, with a value at each
+//! point such that the squared differences at the samples are least (linear least squares; not the image's values at
+//! the points, which noise would spoil). A sample belongs to the cell that it lies in, on a facet to the first of its
+//! cells, and counts by its box, cut at the image's rim. Both errors are root mean squares over the samples that the mesh
+//! covers.
 //!
-//! Sums over the samples in cells come from integrals over facets (`overlap`), each of which serves both of its cells.
-//! The least squares are solved by conjugate gradients (`linear`).
+//! Sums over the samples in cells are made of those of rows of samples, and the least squares are solved by conjugate
+//! gradients (`linear`).
 
 mod linear;
-mod overlap;
 #[cfg(test)]
 mod tests;
 
@@ -21,7 +20,6 @@ use crate::mesh::Mesh;
 use crate::sample::{CellSurfaces, SampleOptions, Statistic, check_samples, sample};
 use crate::watch::{Phase, Watch, check};
 use linear::System;
-use overlap::CellSums;
 
 /// How well the image can be rebuilt from the mesh. Errors are in the unit of the image.
 #[derive(Clone, Debug, PartialEq, serde::Serialize)]
@@ -76,18 +74,16 @@ pub fn fidelity<const D: usize>(
     check_samples(frame, samples, &[])?;
     let mesh = mesh.moved(false, |p| frame.world_to_lattice(Units::Samples, p));
     let placed = PlacedMesh { mesh: &mesh, shape: frame.shape(), samples };
-    let sums = CellSums::new(&placed, watch)?;
-    let [total, within] = sums.total_and_error();
-    if total.is_nan() || total <= 0.0 {
+    check(watch, Phase::Measure, 0.0, None)?;
+    let system = System::new(&placed);
+    let total = system.weight();
+    if total <= 0.0 {
         return Err(MeasureError::NoCells { points: mesh.points().len() });
     }
     check(watch, Phase::Measure, 0.5, None)?;
-    let system = System::new(&placed, sums.mean(total));
-    check(watch, Phase::Measure, 0.7, None)?;
     let fit = system.solve(watch)?;
-    let deviation = sums.deviation(total);
-    let (constant_rms, linear_rms) =
-        ((within / total).max(0.0).sqrt(), fit.mean_square.max(0.0).sqrt());
+    let deviation = system.deviation();
+    let (constant_rms, linear_rms) = (system.constant_rms(), fit.mean_square.max(0.0).sqrt());
     let relative = |rms: f64| (deviation > 0.0).then(|| rms / deviation);
     let whole = frame.grid(Units::Samples).bounds().measure();
     Ok(FidelityReport {

@@ -3,7 +3,6 @@
 use super::*;
 use crate::geometry::Point;
 use crate::mesh::Delaunay;
-use crate::sample::sample_in_frame;
 use crate::watch::Silent;
 
 /// Squares of `size` samples, cut in two, over `count`² squares.
@@ -150,31 +149,62 @@ fn waves<const D: usize>(shape: [usize; D], gaps: bool) -> (Frame<D>, Samples) {
     (Frame::new(shape).unwrap(), Samples::F64((0..count).map(value).collect()))
 }
 
-/// What [`sample_in_frame`] says: the covered share, the deviation, and the error of means.
-fn by_overlap<const D: usize>(mesh: &Mesh<D>, frame: &Frame<D>, samples: &Samples) -> [f64; 3] {
-    let kinds = [Statistic::Mean, Statistic::Std];
-    let options = SampleOptions::new(&kinds);
-    let found = sample_in_frame(mesh, frame, samples, options, &mut Silent).unwrap();
-    let (mut total, mut mean) = (0.0, 0.0);
-    let cells: Vec<[f64; 3]> = (0..mesh.cell_count())
-        .map(|i| [found.measures[i] * found.coverage[i], found.values[0][i], found.values[1][i]])
-        .filter(|[weight, ..]| *weight > 0.0)
-        .collect();
-    for [weight, value, _] in &cells {
-        total += weight;
-        mean += weight * value;
-    }
-    mean /= total;
-    let (mut within, mut between) = (0.0, 0.0);
-    for [weight, value, deviation] in cells {
-        within += weight * deviation * deviation / total;
-        between += weight * (value - mean).powi(2) / total;
-    }
-    let whole = frame.grid(Units::Samples).bounds().measure();
-    [total / whole, (within + between).sqrt(), within.sqrt()]
+/// A sample with its weight, the first cell that has it, the cell's points with the sample's barycentric coordinates, and
+/// its value.
+struct Held {
+    weight: f64,
+    cell: usize,
+    shares: Vec<(usize, f64)>,
+    value: f64,
 }
 
-fn sums_over_facets_are_those_of_overlaps<const D: usize>(
+/// The finite samples that the mesh covers, by trying all cells.
+fn held<const D: usize>(mesh: &Mesh<D>, shape: [usize; D], samples: &Samples) -> Vec<Held> {
+    let of = |i: usize| {
+        let at = crate::image::coordinates(i, shape);
+        let is_rim = |k: usize| at[k] == 0 || at[k] + 1 == shape[k];
+        let weight: f64 = (0..D).map(|k| if is_rim(k) { 0.5 } else { 1.0 }).product();
+        let place = at.map(|x| x as f64);
+        let value = samples.get(i);
+        let found = mesh.cells().enumerate().find_map(|(number, cell)| {
+            let whole = mesh.simplex(cell).measure();
+            let share = |k: usize| {
+                let mut part = mesh.simplex(cell);
+                *(if k == 0 { &mut part.first } else { &mut part.others[k - 1] }) = place;
+                part.measure() / whole
+            };
+            let shares: Vec<(usize, f64)> = (0..=D).map(|k| (cell[k] as usize, share(k))).collect();
+            shares.iter().all(|(_, share)| *share >= -1e-9).then_some((number, shares))
+        });
+        let (cell, shares) = found.filter(|_| value.is_finite())?;
+        Some(Held { weight, cell, shares, value })
+    };
+    (0..samples.len()).filter_map(of).collect()
+}
+
+/// The covered share, the deviation, and the error of means, by definition.
+fn by_definition<const D: usize>(mesh: &Mesh<D>, frame: &Frame<D>, samples: &Samples) -> [f64; 3] {
+    let held = held(mesh, frame.shape(), samples);
+    let mean_of = |of: &dyn Fn(&Held) -> bool| {
+        let sums = held.iter().filter(|h| of(h)).fold([0.0; 2], |[value, weight], h| {
+            [value + h.weight * h.value, weight + h.weight]
+        });
+        sums[0] / sums[1]
+    };
+    let mean = mean_of(&|_| true);
+    let means: Vec<f64> =
+        (0..mesh.cell_count()).map(|cell| mean_of(&|h: &Held| h.cell == cell)).collect();
+    let (mut total, mut all, mut within) = (0.0, 0.0, 0.0);
+    for h in &held {
+        total += h.weight;
+        all += h.weight * (h.value - mean).powi(2);
+        within += h.weight * (h.value - means[h.cell]).powi(2);
+    }
+    let whole = frame.grid(Units::Samples).bounds().measure();
+    [total / whole, (all / total).sqrt(), (within / total).sqrt()]
+}
+
+fn errors_of_means_are_those_by_definition<const D: usize>(
     delaunay: &Delaunay<D>,
     shape: [usize; D],
 ) {
@@ -184,7 +214,7 @@ fn sums_over_facets_are_those_of_overlaps<const D: usize>(
             let mesh = scattered(delaunay, 60, ends, seed);
             let (frame, samples) = waves(shape, gaps);
             let report = fidelity(&mesh, &frame, &samples, &mut Silent).unwrap();
-            let [covered, deviation, constant] = by_overlap(&mesh, &frame, &samples);
+            let [covered, deviation, constant] = by_definition(&mesh, &frame, &samples);
             // sums of some 10³ products of up to 400, whose roundings a square root may double in digits
             assert!((report.covered - covered).abs() < 1e-11, "{report:?} {covered}");
             assert!((report.deviation - deviation).abs() < 1e-8, "{report:?} {deviation}");
@@ -194,9 +224,9 @@ fn sums_over_facets_are_those_of_overlaps<const D: usize>(
 }
 
 #[test]
-fn sums_over_facets_are_those_of_overlaps_in_the_plane_and_in_space() {
-    sums_over_facets_are_those_of_overlaps(&Delaunay::<2>::new(), [10, 10]);
-    sums_over_facets_are_those_of_overlaps(&Delaunay::<3>::new(), [10, 10, 10]);
+fn errors_of_means_are_those_by_definition_in_the_plane_and_in_space() {
+    errors_of_means_are_those_by_definition(&Delaunay::<2>::new(), [10, 10]);
+    errors_of_means_are_those_by_definition(&Delaunay::<3>::new(), [10, 10, 10]);
 }
 
 #[test]
@@ -213,39 +243,17 @@ fn an_inverted_cell_counts_as_one_of_positive_measure() {
     assert!((first.linear_rms - second.linear_rms).abs() < 1e-9 && second.covered > 0.999);
 }
 
-/// A sample's weight, the points of its cell with its barycentric coordinates, and its value.
-type Used = (f64, Vec<(usize, f64)>, f64);
-
 /// The error of the linear fit by elimination, each sample in the first cell that has it.
 fn by_elimination<const D: usize>(mesh: &Mesh<D>, shape: [usize; D], samples: &Samples) -> f64 {
     const MOST: usize = 40;
     let count = mesh.points().len();
     let (mut a, mut b) = ([[0.0; MOST]; MOST], [[0.0; 1]; MOST]);
-    let mut used: Vec<Used> = Vec::new();
-    for i in 0..samples.len() {
-        let at = crate::image::coordinates(i, shape);
-        let is_rim = |k: usize| at[k] == 0 || at[k] + 1 == shape[k];
-        let weight: f64 = (0..D).map(|k| if is_rim(k) { 0.5 } else { 1.0 }).product();
-        let place = at.map(|x| x as f64);
-        let shares = mesh.cells().find_map(|cell| {
-            let whole = mesh.simplex(cell).measure();
-            let share = |k: usize| {
-                let mut part = mesh.simplex(cell);
-                *(if k == 0 { &mut part.first } else { &mut part.others[k - 1] }) = place;
-                part.measure() / whole
-            };
-            let shares: Vec<(usize, f64)> = (0..=D).map(|k| (cell[k] as usize, share(k))).collect();
-            shares.iter().all(|(_, share)| *share >= -1e-9).then_some(shares)
-        });
-        let (Some(shares), value) = (shares, samples.get(i)) else { continue };
-        if !value.is_finite() {
-            continue;
-        }
-        for &(r, own) in &shares {
+    let held = held(mesh, shape, samples);
+    for Held { weight, shares, value, .. } in &held {
+        for &(r, own) in shares {
             shares.iter().for_each(|&(c, other)| a[r][c] += weight * own * other);
             b[r][0] += weight * own * value;
         }
-        used.push((weight, shares, value));
     }
     // a point without samples about it
     for (k, row) in a.iter_mut().enumerate().take(count) {
@@ -254,12 +262,12 @@ fn by_elimination<const D: usize>(mesh: &Mesh<D>, shape: [usize; D], samples: &S
         }
     }
     assert!(crate::geometry::linear::solve(count, a, &mut b) != 0.0);
-    let error = |(weight, shares, value): &Used| {
-        let fitted: f64 = shares.iter().map(|&(point, share)| share * b[point][0]).sum();
-        weight * (value - fitted).powi(2)
+    let error = |h: &Held| {
+        let fitted: f64 = h.shares.iter().map(|&(point, share)| share * b[point][0]).sum();
+        h.weight * (h.value - fitted).powi(2)
     };
-    let total: f64 = used.iter().map(|(weight, ..)| weight).sum();
-    (used.iter().map(error).sum::<f64>() / total).sqrt()
+    let total: f64 = held.iter().map(|h| h.weight).sum();
+    (held.iter().map(error).sum::<f64>() / total).sqrt()
 }
 
 #[test]
