@@ -2,7 +2,7 @@
 //!
 //! [`draw_triangles`] lays a triangular mesh over its image, as in figure 2 of Hale (2001), or atoms over a
 //! field, as in his figure 5; [`draw_slices`] lays the cuts of a tetrahedral mesh over the three
-//! orthogonal slices of its image, as in his figure 9; [`draw_polygons`] and [`draw_polyhedra`] do the same for
+//! orthogonal slices of its image, as in his figure 9; [`draw_curves`] plots functions, as in his figure 3; [`draw_polygons`] and [`draw_polyhedra`] do the same for
 //! Voronoi cells. [`draw_flow`] and [`draw_flow_slices`] show what flows on either. [`Drawing`] holds them for callers
 //! that are generic over the dimension. All return a [`Picture`], a list of what to draw and where, which becomes PNG
 //! or SVG; [`ReportPage`] is a report with its pictures as one HTML file. The same input gives the same bytes.
@@ -12,6 +12,7 @@
 //! half a sample beyond the mesh.
 
 mod color_map;
+mod curves;
 mod cut;
 mod drawing;
 mod error;
@@ -29,8 +30,10 @@ mod shape;
 mod slices;
 mod style;
 mod svg;
+mod ticks;
 mod view;
 
+pub use curves::{Curve, draw_curves};
 pub use drawing::Drawing;
 pub use error::DrawError;
 pub use flow::{

@@ -9,7 +9,8 @@ import pytest
 
 PACKAGE = Path(__file__).resolve().parents[1]
 ROOT = PACKAGE.parents[1]
-DOCUMENTS = [ROOT / "docs" / "python.md", ROOT / "README.md", PACKAGE / "README.md"]
+MANUAL = sorted(page for page in (ROOT / "docs").rglob("*.md") if "```python" in page.read_text(encoding="utf-8"))
+DOCUMENTS = [*MANUAL, ROOT / "README.md", PACKAGE / "README.md"]
 BLOCK = re.compile(r"^```python[^\n]*\n(.*?)^```$", re.MULTILINE | re.DOTALL)
 
 

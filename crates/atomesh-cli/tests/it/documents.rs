@@ -32,19 +32,94 @@ fn block(open: &str) -> Vec<String> {
     lines.take_while(|line| !line.starts_with("```")).map(str::to_owned).collect()
 }
 
+/// All pages of the documents.
+fn documents() -> Vec<PathBuf> {
+    [".", "docs", "docs/tutorials"].into_iter().flat_map(markdown).collect()
+}
+
+/// The anchors of a page's headings, as books and forges name them.
+fn anchors(page: &str) -> BTreeSet<String> {
+    let prose = page.split("```").step_by(2).flat_map(str::lines);
+    let headings = prose.filter_map(|line| line.strip_prefix('#'));
+    let anchor = |heading: &str| {
+        let text = heading.trim_start_matches('#').trim().to_lowercase();
+        let kept = text.chars().filter(|c| c.is_alphanumeric() || matches!(c, ' ' | '-' | '_'));
+        kept.map(|c| if c == ' ' { '-' } else { c }).collect()
+    };
+    headings.map(anchor).collect()
+}
+
 #[test]
-fn links_lead_to_files() {
+fn links_lead_to_files_and_headings() {
     let mut count = 0;
-    for document in markdown(".").into_iter().chain(markdown("docs")) {
+    for document in documents() {
         let text = read(&document);
         let folder = root().join(document.parent().expect("a folder"));
         for target in between(&text, "](", ')').filter(|target| !target.contains("://")) {
-            let file = target.split('#').next().unwrap_or_default();
-            assert!(folder.join(file).exists(), "{} links to {target}", document.display());
+            let (file, anchor) = target.split_once('#').unwrap_or((target, ""));
+            let path = if file.is_empty() { root().join(&document) } else { folder.join(file) };
+            assert!(path.exists(), "{} links to {target}", document.display());
+            let has_anchor = || anchors(&read(&path)).contains(anchor);
+            assert!(anchor.is_empty() || has_anchor(), "{} links to {target}", document.display());
             count += 1;
         }
     }
-    assert!(count > 10, "the documents have links; {count} found");
+    assert!(count > 40, "the documents have links; {count} found");
+}
+
+#[test]
+fn pictures_say_what_they_show() {
+    for document in documents() {
+        let text = read(&document);
+        for words in between(&text, "![", ']') {
+            assert!(words.len() > 15, "{} has a picture without words: {words}", document.display());
+        }
+    }
+}
+
+#[test]
+fn every_page_is_in_the_manual() {
+    let summary = read("docs/SUMMARY.md");
+    for page in markdown("docs").into_iter().chain(markdown("docs/tutorials")) {
+        let name = page.strip_prefix("docs").expect("a page of docs").display().to_string();
+        let is_listed = summary.contains(&format!("]({name})"));
+        assert!(is_listed || matches!(&*name, "SUMMARY.md" | "README.md"), "{name}");
+    }
+}
+
+/// The options that a text names, as in `--size`.
+fn options(text: &str) -> BTreeSet<&str> {
+    let named = text.split("--").skip(1).map(|rest| {
+        let end = rest.find(|c: char| !c.is_ascii_lowercase() && !c.is_ascii_digit() && c != '-');
+        rest[..end.unwrap_or(rest.len())].trim_end_matches('-')
+    });
+    named.filter(|name| name.len() > 1).collect()
+}
+
+#[test]
+fn the_manual_has_every_option_and_no_other() {
+    let commands = read("docs/commands.md");
+    let known = options(&commands);
+    assert!(known.len() > 80, "{known:?}");
+    // of cargo, pip and grep
+    let others = BTreeSet::from(["release", "example", "workspace", "bin", "test", "open"]);
+    for document in documents().iter().filter(|path| !path.ends_with("CHANGELOG.md")) {
+        let text = read(document);
+        for option in options(&text) {
+            let is_known = known.contains(option) || others.contains(option);
+            assert!(is_known, "{} names --{option}", document.display());
+        }
+    }
+    // and the reference has what each command's help has
+    let commands_of = between(&commands, "$ atomesh ", '\n').filter_map(|line| line.strip_suffix(" --help"));
+    let listed: BTreeSet<&str> = commands_of.collect();
+    let help = read("crates/atomesh-cli/tests/cmd/help.md");
+    let list = help.split("Commands:\n").nth(1).and_then(|rest| rest.split("\n\n").next());
+    let names = list.expect("help lists commands").lines().filter_map(|line| {
+        let name = line.strip_prefix("  ")?.split(' ').next()?;
+        (!name.is_empty() && name != "help").then_some(name)
+    });
+    assert_eq!(listed, names.collect());
 }
 
 #[test]

@@ -5,7 +5,8 @@
 //! standard error. `[..]` stands for any text within a line, a line `...` for any lines. With
 //! ATOMESH_UPDATE=1 transcripts that differ are rewritten, to be read before they are kept. `$TOOLS` is the folder of
 //! shell functions that make files which the command itself does not write. The README's
-//! `console` blocks are one more transcript, which goes on where its main command ends.
+//! `console` blocks are one more transcript, which goes on where its main command ends, and so is each page of the manual
+//! in `docs`, whose pictures must be those that its blocks make, byte for byte.
 
 #![cfg(unix)]
 
@@ -143,6 +144,55 @@ fn the_command_does_what_the_transcripts_show() {
         }
     }
     assert!(faults.is_empty(), "\n{faults}");
+}
+
+/// The pictures that a page shows: their files, from its folder.
+fn pictures(page: &str) -> impl Iterator<Item = &str> {
+    page.split("](").skip(1).filter_map(|rest| rest.split(')').next()).filter(|file| file.ends_with(".png"))
+}
+
+#[test]
+fn the_manual_shows_what_the_command_prints_and_draws() {
+    let docs = Path::new(env!("CARGO_MANIFEST_DIR")).join("../../docs");
+    let update = std::env::var_os("ATOMESH_UPDATE").is_some();
+    let mut faults = String::new();
+    for folder in [docs.clone(), docs.join("tutorials")] {
+        let files = fs::read_dir(&folder).unwrap().map(|entry| entry.unwrap().path());
+        let mut pages: Vec<_> = files.filter(|path| path.extension() == Some("md".as_ref())).collect();
+        pages.sort();
+        for page in pages {
+            let text = fs::read_to_string(&page).unwrap();
+            let made = tempfile::tempdir().unwrap();
+            let (found, wrong) = check(&text, made.path());
+            if !wrong.is_empty() && update {
+                fs::write(&page, found).unwrap();
+            }
+            for fault in wrong {
+                let _ = writeln!(faults, "{}: {fault}", page.display());
+            }
+            for picture in pictures(&text) {
+                let shown = folder.join(picture);
+                let drawn = fs::read(made.path().join(shown.file_name().unwrap()));
+                if drawn.is_ok() && drawn.as_ref().ok() == fs::read(&shown).as_ref().ok() {
+                    continue;
+                }
+                match drawn {
+                    Ok(bytes) if update => fs::write(&shown, bytes).unwrap(),
+                    _ => {
+                        let _ = writeln!(faults, "{}: no block draws {picture} as it is", page.display());
+                    }
+                }
+            }
+        }
+    }
+    assert!(faults.is_empty(), "\n{faults}");
+}
+
+#[test]
+fn pictures_of_a_page_are_found() {
+    let page = "![a](images/b.png) | [c](d.md) ![e f](../g.png)\n[h](i.png)";
+    assert_eq!(pictures(page).collect::<Vec<_>>(), ["images/b.png", "../g.png", "i.png"]);
+    assert_eq!(pictures("none").count(), 0);
 }
 
 /// The README's main command, less the build, as the transcripts run it.

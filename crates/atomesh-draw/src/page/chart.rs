@@ -5,6 +5,7 @@ use std::fmt::Write;
 use atomesh::measure::Histogram;
 
 use super::text::{escape, grouped};
+use crate::ticks::{number, ticks};
 
 /// A histogram and what it shows.
 pub(super) struct Chart<'a> {
@@ -24,9 +25,6 @@ const ROOM: [f64; 4] = [8.0, 18.0, 34.0, 34.0];
 
 /// Empty classes shown beyond the first and the last that are not empty.
 const BESIDE: usize = 1;
-
-/// Steps of an axis: 1, 2 or 5 times a power of ten.
-const STEPS: [f64; 3] = [1.0, 2.0, 5.0];
 
 /// The classes of the histogram that are shown, and their places.
 struct Axis {
@@ -128,13 +126,7 @@ impl Chart<'_> {
     /// Numbers under the axis.
     fn ticks(&self, out: &mut String, axis: &Axis) {
         let [from, to] = axis.ends();
-        let rough = (to - from) / 6.0;
-        let power = 10f64.powf(rough.log10().floor());
-        let step = STEPS.into_iter().map(|s| s * power).find(|s| *s >= rough);
-        let step = step.unwrap_or(10.0 * power);
-        let mut i = (from / step - 1e-9).ceil() as i64;
-        while (i as f64) * step <= to * (1.0 + 1e-9) {
-            let value = i as f64 * step;
+        for value in ticks([from, to], 6.0) {
             let at = axis.x(value);
             let _ = writeln!(
                 out,
@@ -144,7 +136,6 @@ impl Chart<'_> {
                 number(value),
                 escape(self.unit)
             );
-            i += 1;
         }
     }
 }
@@ -159,11 +150,4 @@ fn mark(out: &mut String, at: f64, name: &str) {
         "<text x=\"{at:.2}\" y=\"{}\" text-anchor=\"{anchor}\">{name}</text>",
         ROOM[2] - 9.0
     );
-}
-
-/// A number of a few digits.
-fn number(x: f64) -> String {
-    let text = format!("{x:.3}");
-    let text = text.trim_end_matches('0').trim_end_matches('.');
-    if text == "-0" { "0".into() } else { text.into() }
 }
