@@ -24,7 +24,7 @@ use crate::watch::Cancelled;
 pub use edit::{merge_parts, split_part};
 pub use graph::{CellGraph, Link};
 pub use tree::{ClusterTree, Split};
-pub use weights::{SharedFacet, shared_faces, shared_facets};
+pub use weights::{SharedFacet, WeightOptions, shared_faces, shared_facets};
 
 /// How a tree of parts is grown.
 #[derive(Clone, Debug, PartialEq, Eq)]
