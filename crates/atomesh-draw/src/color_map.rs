@@ -50,6 +50,26 @@ impl ColorMap {
     }
 }
 
+/// Turns of the circle of hues from a part's colour to the next one's: by the golden ratio, so that no few of them are
+/// alike.
+const HUE_STEP: f64 = 0.618_033_988_749_895;
+
+/// The lightness and the saturation of the colours of parts, one after another: parts of like hues differ in them.
+const TONES: [[f64; 2]; 3] = [[0.58, 0.75], [0.45, 0.6], [0.72, 0.65]];
+
+/// The colour of a part by its number, from 1 on.
+pub(crate) fn color_of_part(part: i32) -> Color {
+    let hue = (HUE_STEP * f64::from(part)).rem_euclid(1.0);
+    let [lightness, saturation] = TONES[part.rem_euclid(3) as usize];
+    let chroma = saturation * (1.0 - (2.0 * lightness - 1.0).abs());
+    std::array::from_fn(|k| {
+        // each colour is strong about its own hue: red 0, green 1/3, blue 2/3
+        let off = (hue - k as f64 / 3.0).abs();
+        let share = (2.0 - 6.0 * off.min(1.0 - off)).clamp(0.0, 1.0);
+        (255.0 * (lightness + chroma * (share - 0.5))).round() as u8
+    })
+}
+
 /// A range of numbers, cut into [`LEVELS`] of equal height.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(crate) struct Range {
@@ -105,6 +125,19 @@ mod tests {
             let lights: Vec<f64> = (0..=100).map(|i| light(map.at(f64::from(i) / 100.0))).collect();
             assert!(lights.windows(2).all(|pair| pair[1] >= pair[0] - 1.0), "{lights:?}");
             assert_eq!([map.at(-1.0), map.at(2.0)], [map.0[0], map.0[map.0.len() - 1]]);
+        }
+    }
+
+    #[test]
+    fn parts_near_in_number_have_unlike_colours() {
+        assert_eq!(color_of_part(0), [228, 68, 68], "red, in the first tone");
+        for part in 1..200 {
+            for other in part + 1..part + 12 {
+                let [a, b] = [part, other].map(color_of_part);
+                let far: i32 =
+                    (0..3).map(|k| i32::from(a[k]) - i32::from(b[k])).map(i32::abs).sum();
+                assert!(far >= 40, "{part} {a:?}, {other} {b:?}");
+            }
         }
     }
 

@@ -7,6 +7,7 @@ use atomesh::mesh::{Mesh, PolyMesh};
 
 use crate::error::DrawError;
 use crate::flow::{FlowPicture, FlowStyle, draw_flow, draw_flow_slices};
+use crate::parts::{PartsPicture, draw_parts, draw_parts_slices};
 use crate::picture::Picture;
 use crate::plane::{draw_polygons, draw_triangles};
 use crate::slices::{draw_polyhedra, draw_slices};
@@ -19,20 +20,22 @@ pub struct Drawing<const D: usize> {
     pub mesh: fn(&Image<D>, &Mesh<D>, &Style) -> Result<Picture, DrawError>,
     /// Draws Voronoi cells over their image.
     pub cells: fn(&Image<D>, &PolyMesh<D>, &Style) -> Result<Picture, DrawError>,
+    /// Draws parts of cells.
+    pub parts: fn(&PartsPicture<'_, D>, &Style) -> Result<Picture, DrawError>,
     /// Draws flow.
     pub flow: fn(&FlowPicture<'_, D>, &Style, &FlowStyle) -> Result<Picture, DrawError>,
 }
 
 impl Drawing<2> {
-    /// [`draw_triangles`], [`draw_polygons`] and [`draw_flow`].
+    /// [`draw_triangles`], [`draw_polygons`], [`draw_parts`] and [`draw_flow`].
     #[inline(never)] // inlined elsewhere, it would have all functions compiled there
     pub fn plane() -> Self {
-        Self { mesh: draw_triangles, cells: draw_polygons, flow: draw_flow }
+        Self { mesh: draw_triangles, cells: draw_polygons, parts: draw_parts, flow: draw_flow }
     }
 }
 
 impl Drawing<3> {
-    /// [`draw_slices`], [`draw_polyhedra`] and [`draw_flow_slices`], through the middle of the image, atoms drawn.
+    /// [`draw_slices`], [`draw_polyhedra`], [`draw_parts_slices`] and [`draw_flow_slices`], through the middle of the image, atoms drawn.
     #[inline(never)]
     pub fn space() -> Self {
         Self {
@@ -40,6 +43,7 @@ impl Drawing<3> {
             cells: |image, mesh, style| {
                 draw_polyhedra(image, mesh, middle(image), &with_atoms(style))
             },
+            parts: draw_parts_slices,
             flow: |flow, style, flow_style| draw_flow_slices(flow, None, style, flow_style),
         }
     }

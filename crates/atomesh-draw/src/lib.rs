@@ -2,8 +2,9 @@
 //!
 //! [`draw_triangles`] lays a triangular mesh over its image, as in figure 2 of Hale (2001), or atoms over a
 //! field, as in his figure 5; [`draw_slices`] lays the cuts of a tetrahedral mesh over the three
-//! orthogonal slices of its image, as in his figure 9; [`draw_curves`] plots functions, as in his figure 3; [`draw_polygons`] and [`draw_polyhedra`] do the same for
-//! Voronoi cells. [`draw_flow`] and [`draw_flow_slices`] show what flows on either. [`Drawing`] holds them for callers
+//! orthogonal slices of its image, as in his figure 9; [`draw_polygons`] and [`draw_polyhedra`] do the same for
+//! Voronoi cells, [`draw_curves`] plots functions, as in his figure 3. [`draw_flow`] and [`draw_flow_slices`] show what
+//! flows on a mesh, [`draw_parts`] and [`draw_parts_slices`] parts of its cells. [`Drawing`] holds them for callers
 //! that are generic over the dimension. All return a [`Picture`], a list of what to draw and where, which becomes PNG
 //! or SVG; [`ReportPage`] is a report with its pictures as one HTML file. The same input gives the same bytes.
 //!
@@ -21,6 +22,7 @@ mod label;
 mod legend;
 mod page;
 mod panel;
+mod parts;
 mod picture;
 mod plane;
 mod png_encode;
@@ -40,6 +42,7 @@ pub use flow::{
     FlowCells, FlowLine, FlowPicture, FlowStyle, FlowWell, draw_flow, draw_flow_slices,
 };
 pub use page::ReportPage;
+pub use parts::{PartsPicture, draw_parts, draw_parts_slices};
 pub use picture::{Picture, PictureFormat};
 pub use plane::{draw_polygons, draw_triangles};
 pub use slices::{draw_polyhedra, draw_slices};

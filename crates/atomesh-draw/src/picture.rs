@@ -61,7 +61,7 @@ impl Picture {
             Shape::Image { .. } | Shape::Fill { .. } => 1,
             Shape::Lines { lines, .. } => lines.len(),
             Shape::Discs { centers, .. } | Shape::Squares { centers, .. } => centers.len(),
-            Shape::Polygons { polygons, .. } => polygons.len(),
+            Shape::Polygons { polygons, .. } | Shape::Tint { polygons, .. } => polygons.len(),
         };
         self.shapes.iter().map(count).sum()
     }

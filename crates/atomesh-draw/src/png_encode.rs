@@ -74,12 +74,12 @@ fn draw(pixmap: &mut Pixmap, shape: &Shape) {
                 }
             }
         }
-        Shape::Discs { centers, radius, color } => fill(pixmap, paint(*color), |path| {
+        Shape::Discs { centers, radius, color } => fill(pixmap, &paint(*color), |path| {
             for c in centers {
                 path.push_circle(c[0] as f32, c[1] as f32, *radius as f32);
             }
         }),
-        Shape::Squares { centers, half, color } => fill(pixmap, paint(*color), |path| {
+        Shape::Squares { centers, half, color } => fill(pixmap, &paint(*color), |path| {
             for c in centers {
                 let [x, y] = c.map(|v| (v - half) as f32);
                 let side = 2.0 * *half as f32;
@@ -89,11 +89,20 @@ fn draw(pixmap: &mut Pixmap, shape: &Shape) {
             }
         }),
         Shape::Polygons { polygons, color, smooth } => {
-            for some in polygons.chunks(LINES_PER_PATH / 8) {
-                let paint = Paint { anti_alias: *smooth, ..paint(*color) };
-                fill(pixmap, paint, |path| some.iter().for_each(|polygon| push(path, polygon)));
-            }
+            let paint = Paint { anti_alias: *smooth, ..paint(*color) };
+            fill_polygons(pixmap, polygons, &paint);
         }
+        Shape::Tint { polygons, color: [r, g, b], opacity } => {
+            let mut paint = Paint { anti_alias: false, ..Paint::default() };
+            paint.set_color_rgba8(*r, *g, *b, (255.0 * opacity).round() as u8);
+            fill_polygons(pixmap, polygons, &paint);
+        }
+    }
+}
+
+fn fill_polygons(pixmap: &mut Pixmap, polygons: &[Vec<Place>], paint: &Paint<'_>) {
+    for some in polygons.chunks(LINES_PER_PATH / 8) {
+        fill(pixmap, paint, |path| some.iter().for_each(|polygon| push(path, polygon)));
     }
 }
 
@@ -109,12 +118,12 @@ fn push(path: &mut PathBuilder, polygon: &[Place]) {
     path.close();
 }
 
-fn fill(pixmap: &mut Pixmap, paint: Paint, build: impl Fn(&mut PathBuilder)) {
+fn fill(pixmap: &mut Pixmap, paint: &Paint<'_>, build: impl Fn(&mut PathBuilder)) {
     let mut path = PathBuilder::new();
     build(&mut path);
     if let Some(path) = path.finish() {
         let identity = Transform::identity();
-        pixmap.fill_path(&path, &paint, FillRule::Winding, identity, None);
+        pixmap.fill_path(&path, paint, FillRule::Winding, identity, None);
     }
 }
 

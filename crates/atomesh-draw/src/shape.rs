@@ -29,6 +29,8 @@ pub(crate) enum Shape {
     Squares { centers: Vec<Place>, half: f64, color: Color },
     /// Filled polygons of one colour, antialiased if `smooth`; else neighbours leave no seam.
     Polygons { polygons: Vec<Vec<Place>>, color: Color, smooth: bool },
+    /// The same over what is below, of which 1 − `opacity` shows through; neighbours leave no seam.
+    Tint { polygons: Vec<Vec<Place>>, color: Color, opacity: f64 },
 }
 
 impl Shape {

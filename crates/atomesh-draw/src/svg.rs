@@ -45,14 +45,17 @@ fn draw(out: &mut String, shape: &Shape) -> Result<(), DrawError> {
         Shape::Polygons { polygons, color, smooth } => {
             let color = hex(*color);
             let edges = if *smooth { "" } else { " shape-rendering=\"crispEdges\"" };
-            let mut d = String::new();
-            for polygon in polygons {
-                for (i, corner) in polygon.iter().enumerate() {
-                    point(&mut d, if i == 0 { 'M' } else { 'L' }, *corner);
-                }
-                d.push('Z');
-            }
+            let d = outlines(polygons);
             line(out, format_args!("<path fill=\"{color}\"{edges} d=\"{d}\"/>"));
+        }
+        Shape::Tint { polygons, color, opacity } => {
+            let (color, opacity, d) = (hex(*color), number(*opacity), outlines(polygons));
+            line(
+                out,
+                format_args!(
+                    "<path fill=\"{color}\" fill-opacity=\"{opacity}\" shape-rendering=\"crispEdges\" d=\"{d}\"/>"
+                ),
+            );
         }
     }
     Ok(())
@@ -79,6 +82,18 @@ fn image(
         ),
     );
     Ok(())
+}
+
+/// Polygons as a path.
+fn outlines(polygons: &[Vec<Place>]) -> String {
+    let mut d = String::new();
+    for polygon in polygons {
+        for (i, corner) in polygon.iter().enumerate() {
+            point(&mut d, if i == 0 { 'M' } else { 'L' }, *corner);
+        }
+        d.push('Z');
+    }
+    d
 }
 
 /// Lines; one that begins where the one before it ends is joined to it.

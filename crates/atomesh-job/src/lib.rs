@@ -8,7 +8,7 @@
 //! - [`values`]: how values such as `6..18` or `120,40:rate=2` are spelt.
 //! - [`images`], [`mesh_file`]: reading, with what a reader took for granted as notes.
 //! - jobs, in memory and from file to file: [`mesh`](mod@mesh), [`flow`](mod@flow), [`features`](mod@features),
-//!   [`surfaces`], [`sample`], [`export`], [`enhance`], [`measure`]. Files to write are checked before the work and
+//!   [`clusters`](mod@clusters), [`surfaces`], [`sample`], [`export`], [`enhance`], [`measure`]. Files to write are checked before the work and
 //!   appear whole or not at all.
 //! - [`memory`]: how much is left, how much was used.
 //!
@@ -48,6 +48,7 @@
 //! # Ok::<(), Box<dyn std::error::Error>>(())
 //! ```
 
+pub mod clusters;
 mod dimension;
 pub mod enhance;
 mod error;

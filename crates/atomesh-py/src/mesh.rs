@@ -17,6 +17,7 @@ use atomesh::run::Outcome;
 use atomesh_draw::{DrawError, Picture, PictureFormat};
 use atomesh_io::image::AnyImage;
 use atomesh_io::mesh::World;
+use atomesh_job::clusters::ClustersRequest;
 use atomesh_job::features::FeaturesRequest;
 use atomesh_job::mesh::{MadeMesh, MeshImages, prepare};
 use atomesh_job::options::{OutputOptions, RunConfig};
@@ -429,6 +430,68 @@ impl Mesh {
         let (found, _) =
             work(py, &how, move |session| shared.0.features(&request, image, session))?;
         Ok(found)
+    }
+
+    /// Parts of the cells that hang together and end at features: units between faults, organs, grains.
+    ///
+    /// Parts of a call with more of them lie within those of a call with fewer.
+    ///
+    /// Parameters
+    /// ----------
+    /// image : Image, array or path-like, optional
+    ///     The image whose features part the cells. Default: of a mesh that `mesh` made its own b(x), of one that was read its
+    ///     values "potential".
+    /// parts : int
+    ///     How many parts; fewer if none is left that can be cut into two. Default 20.
+    /// least_cells : int
+    ///     The least cells of a part. Default 8.
+    /// contrast : float
+    ///     The mean of |b| along a facet by which its weight falls to 1/e. Default 0.2.
+    /// multiplier : float
+    ///     The multiplier of the weights of the mesh's own features, 0 (walls) to 1. Default 0.
+    /// **options
+    ///     With `image`: `features`, `smooth` ... as of `enhance`.
+    ///
+    /// Returns
+    /// -------
+    /// numpy.ndarray
+    ///     The part of each cell, shape (m,), int32, from 1 on.
+    ///
+    /// Examples
+    /// --------
+    /// >>> import numpy as np, atomesh as am
+    /// >>> img = np.full((60, 80), 200, np.uint8); img[30, :] = 10
+    /// >>> mesh = am.mesh(img, size=8)
+    /// >>> part = mesh.clusters(parts=2)
+    /// >>> sorted(set(part.tolist())), len(part) == mesh.cell_count
+    /// ([1, 2], True)
+    #[pyo3(signature = (image = None, *, parts = 20, least_cells = 8, contrast = 0.2, multiplier = 0.0, **options))]
+    #[allow(clippy::too_many_arguments)] // keywords
+    fn clusters<'py>(
+        &self,
+        py: Python<'py>,
+        image: Option<&Bound<'py, PyAny>>,
+        parts: usize,
+        least_cells: usize,
+        contrast: f64,
+        multiplier: f64,
+        options: Option<&Bound<'py, PyDict>>,
+    ) -> PyResult<Bound<'py, numpy::PyArray1<i32>>> {
+        let Wishes { run, how, .. } = Wishes::take("clusters", options, &["features", "frame"])?;
+        let image = Self::image_for(image)?;
+        let shared = Arc::clone(&self.shared);
+        let request = ClustersRequest {
+            parts,
+            least_cells,
+            contrast,
+            multiplier,
+            features: run.features,
+            frame: run.frame,
+            ..Default::default()
+        };
+        let (found, _) =
+            work(py, &how, move |session| shared.0.clusters(&request, image, session))?;
+        Ok(numpy::PyArray1::from_vec(py, found))
     }
 
     /// A group of facets, or the closed surface of a region, as a surface of its own (in the plane: a curve).

@@ -59,7 +59,7 @@ def test_examples_of_docstrings_run(name: str, example: doctest.DocTest, in_tmp:
 def test_main_functions_have_examples() -> None:
     with_examples = {name for name, _ in examples()}
     assert with_examples >= {
-        "Image", "Mesh", "Mesh.quality", "Mesh.report", "Mesh.features", "Mesh.surface", "Mesh.sample", "Mesh.flow", "Mesh.write",
+        "Image", "Mesh", "Mesh.quality", "Mesh.report", "Mesh.features", "Mesh.clusters", "Mesh.surface", "Mesh.sample", "Mesh.flow", "Mesh.write",
         "Mesh.picture", "Editor", "Lattice", "Surface", "enhance", "lattice", "mesh", "read", "size_field",
     }
 

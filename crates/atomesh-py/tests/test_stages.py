@@ -270,6 +270,28 @@ def test_surfaces_have_the_points_that_they_need(in_tmp: Path) -> None:
         right.write("no folder/s.vtp")
 
 
+@pytest.mark.parametrize("kind", ["delaunay", "voronoi"])
+def test_clusters_end_at_features_and_are_nested(in_tmp: Path, kind: str) -> None:
+    # a dark column through the whole image at x = 30: no part has cells on both sides of it
+    image = np.full((60, 80), 200, np.uint8)
+    image[:, 30] = 10
+    mesh = am.mesh(image, size=6, kind=kind)  # type: ignore[arg-type]
+    five, six = mesh.clusters(parts=5), mesh.clusters(parts=6)
+    assert (five.dtype, five.shape) == (np.int32, (mesh.cell_count,))
+    assert sorted(set(five.tolist())) == [1, 2, 3, 4, 5]
+    assert len({(a, b) for a, b in zip(five.tolist(), six.tolist(), strict=True)}) == 6
+    x = mesh.sample(np.tile(np.arange(80.0), (60, 1)))
+    right = {part: x[five == part].mean() > 30 for part in range(1, 6)}
+    assert np.mean([right[part] == (at > 30) for part, at in zip(five.tolist(), x, strict=True)]) > 0.98
+    mesh.write("m.vtu")
+    read = am.read_mesh("m.vtu")
+    np.testing.assert_array_equal(read.clusters(image, parts=5, threads=1), read.clusters(image, parts=5, threads=2))
+    with pytest.raises(am.InputError, match="0 parts"):
+        mesh.clusters(parts=0)
+    with pytest.raises(am.InputError, match="contrast"):
+        mesh.clusters(contrast=0.0)
+
+
 def test_reports_are_those_of_the_mesh_or_of_an_image(in_tmp: Path) -> None:
     mesh = am.mesh(FLAT, size=7)
     report = mesh.report()

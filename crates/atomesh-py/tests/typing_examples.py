@@ -48,6 +48,7 @@ def page(folder: Path) -> None:
     if mesh.regions is not None:
         assert_type(mesh.regions, npt.NDArray[np.int32])
     print(mesh.region_names, mesh.meta["seed"], mesh.quality()["inverted"], mesh.report()["shape"], mesh.kind, mesh.dim)
+    mesh.cell_data["part"] = mesh.clusters(parts=4, features="dark")
     for surface in mesh.features():
         assert_type(surface.points, npt.NDArray[np.float64])
     mesh.surface("xmin").write(folder / "xmin.vtp")

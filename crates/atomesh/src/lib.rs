@@ -25,6 +25,7 @@ pub mod conform;
 pub mod improve;
 pub mod edit;
 pub mod features;
+pub mod cluster;
 pub mod sample;
 pub mod voronoi;
 pub mod measure;

@@ -31,6 +31,8 @@ pub enum Phase {
     Solve,
     /// Following streamlines.
     Trace,
+    /// Parting cells into clusters.
+    Cluster,
     /// Drawing pictures.
     Draw,
     /// Writing files.
@@ -52,6 +54,7 @@ impl Phase {
             Phase::Assemble => "assemble",
             Phase::Solve => "solve",
             Phase::Trace => "trace",
+            Phase::Cluster => "cluster",
             Phase::Draw => "draw",
             Phase::Write => "write",
         }

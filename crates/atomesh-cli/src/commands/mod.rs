@@ -1,6 +1,7 @@
 //! The commands, one file each.
 
 pub mod check;
+pub mod clusters;
 pub mod completions;
 pub mod enhance;
 pub mod export;

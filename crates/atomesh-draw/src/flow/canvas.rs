@@ -5,7 +5,7 @@ use std::f64::consts::TAU;
 use super::arrow::{Vector, outline, thinned};
 use super::clip;
 use super::picture::{FlowPicture, FlowStyle};
-use crate::color_map::{PLASMA, Range, VIRIDIS};
+use crate::color_map::{PLASMA, Range, VIRIDIS, color_of_part};
 use crate::legend::Bar;
 use crate::shape::{Place, Rect, Shape};
 use crate::style::{Color, Style};
@@ -72,6 +72,10 @@ pub(super) struct Appearance<'a> {
     pub flow: &'a FlowStyle,
     /// Pressures of all cells, and their range.
     pub pressures: &'a [f64],
+    /// The part of each cell.
+    pub parts: &'a [i32],
+    /// Whether an image is behind the cells.
+    pub has_image: bool,
     pub pressure: Option<Range>,
     /// The range of times of flight.
     pub time: Option<Range>,
@@ -92,6 +96,8 @@ impl<'a> Appearance<'a> {
             style,
             flow: flow_style,
             pressures: flow.pressures,
+            parts: flow.parts,
+            has_image: flow.image.is_some(),
             pressure: Range::robust(flow.pressures.iter().copied(), PRESSURE_CUT),
             time: Range::robust(times, TIME_CUT),
             longest: length * flow_style.longest_vector,
@@ -106,6 +112,9 @@ impl<'a> Appearance<'a> {
         bars.filter(|_| self.flow.legend).collect()
     }
 }
+
+/// How much of an image the colours of parts cover.
+const TINT: f64 = 0.45;
 
 /// The share of cells beyond each end of the colours of pressures: those at wells are extreme.
 const PRESSURE_CUT: [f64; 2] = [0.005; 2];
@@ -129,6 +138,7 @@ impl Canvas {
                 smooth: false,
             }));
         }
+        self.push_parts(look, &mut shapes);
         if look.style.edges {
             let (width, color) = (look.style.edge_width, look.style.edge_color);
             shapes.push(Shape::Lines { lines: self.within(&self.edges), width, color });
@@ -138,6 +148,19 @@ impl Canvas {
         self.push_vectors(look, along, &mut shapes);
         shapes.extend(self.marks.iter().flat_map(|mark| mark_shapes(mark, &self.rect)));
         shapes
+    }
+
+    fn push_parts(&self, look: &Appearance, shapes: &mut Vec<Shape>) {
+        let mut tiles: Vec<(i32, &Tile)> = (self.tiles.iter())
+            .filter_map(|tile| Some((*look.parts.get(tile.cell)?, tile)))
+            .collect();
+        tiles.sort_by_key(|(part, _)| *part); // stable
+        shapes.extend(tiles.chunk_by(|a, b| a.0 == b.0).map(|tiles| Shape::Tint {
+            polygons:
+                tiles.iter().map(|(_, tile)| clip::polygon(&tile.polygon, &self.rect)).collect(),
+            color: color_of_part(tiles[0].0),
+            opacity: if look.has_image { TINT } else { 1.0 },
+        }));
     }
 
     fn within(&self, lines: &[[Place; 2]]) -> Vec<[Place; 2]> {

@@ -16,7 +16,7 @@ pub enum FlowCells<'a, const D: usize> {
 }
 
 impl<const D: usize> FlowCells<'_, D> {
-    pub(super) fn cell_count(&self) -> usize {
+    pub(crate) fn cell_count(&self) -> usize {
         match self {
             Self::Simplices(mesh) => mesh.cell_count(),
             Self::Polytopes(mesh) => mesh.cell_count(),
@@ -79,6 +79,8 @@ pub struct FlowPicture<'a, const D: usize> {
     /// The pressure of each cell, drawn as its colour in place of the image, from dark blue through green to yellow
     /// at the highest.
     pub pressures: &'a [f64],
+    /// The part of each cell, from 1 on, drawn as its colour over the image: a few that are unlike, again and again.
+    pub parts: &'a [i32],
     /// Wells: discs with a ring, red where something flows in, blue where it flows out.
     pub wells: &'a [FlowWell<D>],
     /// Streamlines, coloured by time from violet through red to yellow at the longest.
@@ -94,6 +96,7 @@ impl<'a, const D: usize> FlowPicture<'a, D> {
             barriers: &[],
             velocities: &[],
             pressures: &[],
+            parts: &[],
             wells: &[],
             lines: &[],
         }
@@ -101,9 +104,11 @@ impl<'a, const D: usize> FlowPicture<'a, D> {
 
     pub(super) fn check(&self) -> Result<(), DrawError> {
         let (cells, facets) = (self.cells.cell_count(), self.facet_count());
-        for (what, found) in
-            [("velocities", self.velocities.len()), ("pressures", self.pressures.len())]
-        {
+        for (what, found) in [
+            ("velocities", self.velocities.len()),
+            ("pressures", self.pressures.len()),
+            ("parts", self.parts.len()),
+        ] {
             if found != 0 && found != cells {
                 return Err(DrawError::Count { what, found, expected: cells });
             }

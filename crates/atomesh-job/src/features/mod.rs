@@ -3,6 +3,8 @@
 mod cells;
 mod write;
 
+pub(crate) use write::{note_lost, tagged};
+
 use std::path::{Path, PathBuf};
 
 use atomesh::enhance::{FeatureOptions, given_potential};
@@ -235,7 +237,7 @@ fn own_features<const D: usize>(
 }
 
 /// b along the facets, from an image or potential.
-fn along<const D: usize>(
+pub(crate) fn along<const D: usize>(
     request: &FeaturesRequest,
     loaded: &LoadedMesh<D>,
     image: Image<D>,
@@ -249,7 +251,7 @@ fn along<const D: usize>(
 }
 
 /// b from an image or potential, with the frame and the lattice units that it is in.
-fn potential<const D: usize>(
+pub(crate) fn potential<const D: usize>(
     request: &FeaturesRequest,
     made_by: Option<&Provenance>,
     image: Image<D>,

@@ -108,7 +108,7 @@ impl<'a> FeatureFiles<'a> {
         {
             let tags = self.tags(loaded, found, dimension.tools)?;
             let format = MeshFormat::of(path).map_err(JobError::misuse)?;
-            let (data, lost) = tagged(loaded, &tags);
+            let (data, lost) = tagged(loaded, &tags, |_| false);
             note_lost(loaded, lost, named, session);
             let written = (dimension.files.mesh)(path, format, &data, session);
             written.map_err(|e| JobError::from(e).about(path))?;
@@ -151,7 +151,7 @@ impl<'a> FeatureFiles<'a> {
 }
 
 /// Notes the fields of a mesh that its new file does not have: those lost, or all where the format has no place.
-fn note_lost<const D: usize>(
+pub(crate) fn note_lost<const D: usize>(
     loaded: &LoadedMesh<D>,
     mut lost: Vec<String>,
     path: &Path,
@@ -169,11 +169,12 @@ fn note_lost<const D: usize>(
     }
 }
 
-/// The mesh with new tags and all else that it had; and which fields it lost, since a name that another program gave may
+/// The mesh with new tags and all else that it had but some values of its cells; and which fields it lost, since a name that another program gave may
 /// not fit every format.
-fn tagged<'a, const D: usize>(
+pub(crate) fn tagged<'a, const D: usize>(
     loaded: &'a LoadedMesh<D>,
     tags: &'a Tags<D>,
+    is_left_out: impl Fn(&str) -> bool,
 ) -> (MeshData<'a, D>, Vec<String>) {
     let mut data = MeshData::new(&loaded.mesh).with_tags(tags);
     let mut lost = Vec::new();
@@ -183,7 +184,7 @@ fn tagged<'a, const D: usize>(
             Err(e) => lost.push(format!("left out: {e}")),
         }
     }
-    for field in &loaded.cell_fields {
+    for field in loaded.cell_fields.iter().filter(|field| !is_left_out(&field.name)) {
         match data.clone().with_cell_field(&field.name, &field.values) {
             Ok(with) => data = with,
             Err(e) => lost.push(format!("left out: {e}")),

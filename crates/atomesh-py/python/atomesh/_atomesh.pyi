@@ -147,6 +147,16 @@ class Mesh:
         close_gaps: bool = False,
         **options: Unpack[MeshFeaturesOptions],
     ) -> list[Surface]: ...
+    def clusters(
+        self,
+        image: ImageLike | None = None,
+        *,
+        parts: int = 20,
+        least_cells: int = 8,
+        contrast: float = 0.2,
+        multiplier: float = 0.0,
+        **options: Unpack[MeshFeaturesOptions],
+    ) -> npt.NDArray[np.int32]: ...
     def surface(self, name: str | int) -> Surface: ...
     def sample(
         self,

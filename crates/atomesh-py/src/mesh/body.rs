@@ -3,6 +3,7 @@
 use atomesh::mesh::Regions;
 use atomesh_io::image::AnyImage;
 use atomesh_io::mesh::OwnedField;
+use atomesh_job::clusters::ClustersRequest;
 use atomesh_job::features::FeaturesRequest;
 use atomesh_job::flow::FlowOptions;
 use atomesh_job::options::{OutputOptions, RunConfig};
@@ -88,6 +89,17 @@ pub trait Body: Send + Sync {
         image: Option<AnyImage>,
         session: &mut Session<'_>,
     ) -> Result<Vec<Surface>, JobError>;
+
+    /// The part of each cell.
+    ///
+    /// # Errors
+    /// As [`Body::features`].
+    fn clusters(
+        &self,
+        request: &ClustersRequest,
+        image: Option<AnyImage>,
+        session: &mut Session<'_>,
+    ) -> Result<Vec<i32>, JobError>;
 
     /// A group of facets or the surface of a region.
     ///

@@ -7,6 +7,7 @@ use atomesh_draw::Style;
 use atomesh_io::image::AnyImage;
 use atomesh_io::mesh::OwnedField;
 use atomesh_io::mesh::cells::{LoadedCells, NO_CELL};
+use atomesh_job::clusters::{ClustersRequest, clusters};
 use atomesh_job::features::{FeaturesRequest, features_of_cells};
 use atomesh_job::flow::{FlowMesh, FlowOptions};
 use atomesh_job::measure::measure_cells;
@@ -174,7 +175,7 @@ impl<const D: usize> Body for CellsBody<D> {
             let message = "the cells name their features; expected no image, or --below B too";
             return Err(JobError::misuse(message));
         }
-        let image = images::placed(request, image, dimension)?;
+        let image = images::placed(&request.frame, image, dimension)?;
         let found = features_of_cells(request, loaded, image, dimension, session)?;
         let (cells, faces) = (&loaded.mesh, &found.faces);
         let groups = feature_groups(cells, faces).into_iter().zip(found.report(cells));
@@ -182,6 +183,17 @@ impl<const D: usize> Body for CellsBody<D> {
             Surface::new(name, cells.points(), &facets, info)
         };
         Ok(groups.map(surface).collect())
+    }
+
+    fn clusters(
+        &self,
+        request: &ClustersRequest,
+        image: Option<AnyImage>,
+        session: &mut Session<'_>,
+    ) -> Result<Vec<i32>, JobError> {
+        let Self { loaded, dimension, .. } = self;
+        let image = images::placed(&request.frame, image, dimension)?;
+        Ok(clusters(request, loaded, image, dimension, session)?.parts)
     }
 
     fn surface(&self, name: &str) -> Result<Surface, JobError> {

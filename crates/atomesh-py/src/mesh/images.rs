@@ -2,10 +2,9 @@
 
 use atomesh::image::{Frame, Image as CoreImage};
 use atomesh_io::image::AnyImage;
-use atomesh_job::features::FeaturesRequest;
 use atomesh_job::images::is_bare;
 use atomesh_job::measure::{Against, MeasureRequest};
-use atomesh_job::options::RunConfig;
+use atomesh_job::options::{FrameOptions, RunConfig};
 use atomesh_job::sample::{NamedImage, SampleRequest, SampledMesh, sample};
 use atomesh_job::{Dimension, JobError, Session};
 
@@ -41,11 +40,11 @@ pub fn against<const D: usize>(
 
 /// The image whose features are looked for, placed.
 pub fn placed<const D: usize>(
-    request: &FeaturesRequest,
+    frame: &FrameOptions,
     image: Option<AnyImage>,
     dimension: &Dimension<D>,
 ) -> Result<Option<CoreImage<D>>, JobError> {
-    image.map(|image| request.frame.place(in_dimension(image, dimension)?)).transpose()
+    image.map(|image| frame.place(in_dimension(image, dimension)?)).transpose()
 }
 
 /// What a mesh is shown over and compared with: its own image, or one that is given, in the same place.

@@ -5,6 +5,7 @@ use atomesh::mesh::{FacetGroup, Regions};
 use atomesh_draw::Style;
 use atomesh_io::image::AnyImage;
 use atomesh_io::mesh::{LoadedMesh, OwnedField};
+use atomesh_job::clusters::{ClustersRequest, clusters, clusters_of_facets, facets_of_mesh};
 use atomesh_job::features::FeaturesRequest;
 use atomesh_job::flow::{FlowMesh, FlowOptions};
 use atomesh_job::measure::measure;
@@ -131,7 +132,7 @@ impl<const D: usize> Body for SimplexBody<D> {
         image: Option<AnyImage>,
         session: &mut Session<'_>,
     ) -> Result<Vec<Surface>, JobError> {
-        let image = images::placed(request, image, &self.dimension)?;
+        let image = images::placed(&request.frame, image, &self.dimension)?;
         let found = match (&self.made, request.below, &image) {
             // the run's own b, which is known between points too
             (Some(made), Some(_), None) => {
@@ -153,6 +154,26 @@ impl<const D: usize> Body for SimplexBody<D> {
             Surface::new(name, mesh.points(), &feature.facets, report)
         });
         Ok(made.collect())
+    }
+
+    fn clusters(
+        &self,
+        request: &ClustersRequest,
+        image: Option<AnyImage>,
+        session: &mut Session<'_>,
+    ) -> Result<Vec<i32>, JobError> {
+        let Self { loaded, made, dimension, .. } = self;
+        let image = images::placed(&request.frame, image, dimension)?;
+        let (Some(made), None) = (made, &image) else {
+            return Ok(clusters(request, loaded, image, dimension, session)?.parts);
+        };
+        // the run's own b, which is known between points too
+        let outcome = &made.outcome;
+        let field = dimension.tools.field_along;
+        let field = field(outcome.mesh(), outcome.potential(), session)?;
+        let facets = facets_of_mesh(request, loaded, Some(&field), dimension);
+        let cell_count = loaded.mesh.cell_count();
+        Ok(clusters_of_facets(request, cell_count, &facets, true, session)?.parts)
     }
 
     fn surface(&self, name: &str) -> Result<Surface, JobError> {

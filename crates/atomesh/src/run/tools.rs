@@ -1,5 +1,6 @@
 //! What is done with images and meshes outside of a run, as a value.
 
+use crate::cluster::{SharedFacet, shared_faces, shared_facets};
 use crate::enhance::{EnhanceError, Enhanced, FeatureOptions, Mixture, enhance, enhance_mixture};
 use crate::features::{
     FacetField, FeatureFaces, FeatureFacetOptions, FeatureSet, FeaturesError, feature_faces,
@@ -12,7 +13,7 @@ use crate::measure::{
     FidelityReport, HomogeneityReport, MeasureError, ShapeReport, WantedSize, fidelity,
     homogeneity, shape,
 };
-use crate::mesh::{Delaunay, Mesh, PolyMesh, PolyReport, Tags};
+use crate::mesh::{Delaunay, FacetGroup, Mesh, PolyMesh, PolyReport, Tags};
 use crate::sample::{CellProperties, SampleError, SampleOptions, sample};
 use crate::voronoi::{VoronoiError, voronoi};
 use crate::watch::Watch;
@@ -28,6 +29,9 @@ type EnhanceMixture<const D: usize> =
 
 type FieldAlong<const D: usize> =
     fn(&Mesh<D>, &ScalarField<D>, &mut dyn Watch) -> Result<FacetField<D>, FeaturesError>;
+
+type SharedFacets<const D: usize> =
+    fn(&Mesh<D>, Option<&FacetField<D>>, &[(&FacetGroup<D>, f64)]) -> Vec<SharedFacet>;
 
 type FindFeatures<const D: usize> =
     fn(&Mesh<D>, &FacetField<D>, &FeatureFacetOptions) -> Result<FeatureSet<D>, FeaturesError>;
@@ -81,6 +85,10 @@ pub struct Tools<const D: usize> {
     pub measure_cells: MeasureCells<D>,
     /// [`feature_faces`](feature_faces()).
     pub feature_faces: fn(&PolyMesh<D>, &ScalarField<D>, f64, f64) -> FeatureFaces,
+    /// [`shared_facets`].
+    pub shared_facets: SharedFacets<D>,
+    /// [`shared_faces`], with one multiplier for all features.
+    pub shared_faces: fn(&PolyMesh<D>, &FeatureFaces, f64) -> Vec<SharedFacet>,
     /// [`shape`](shape()).
     pub shape: Shape<D>,
     /// [`PolyReport::new`].
@@ -136,6 +144,8 @@ impl<const D: usize> Tools<D> {
             measure: MeshReport::new,
             measure_cells: VoronoiReport::new,
             feature_faces,
+            shared_facets,
+            shared_faces: |mesh, features, multiplier| shared_faces(mesh, features, |_| multiplier),
             shape,
             cells_shape: PolyReport::new,
             fidelity,
