@@ -94,15 +94,22 @@ mod tests {
 
     #[test]
     fn a_curve_passes_through_its_values_and_leaves_gaps() {
-        let line = Curve { function: &|x| if x < 0.5 { 2.0 * x } else { f64::NAN }, range: [0.0, 1.0] };
+        let line =
+            Curve { function: &|x| if x < 0.5 { 2.0 * x } else { f64::NAN }, range: [0.0, 1.0] };
         let picture = draw_curves(&[line]);
         assert_eq!((picture.width(), picture.height()), (460, 360));
         let Shape::Lines { lines, .. } = &picture.shapes[2] else { panic!("a curve") };
         assert_eq!(lines.len(), PIECES / 2 - 1);
         // values from 0 to nearly 1 with 6 % free on both sides: 0 stands 6/112 above the bottom of 304 pixels
         let [start, end] = [lines[0][0], lines[lines.len() - 1][1]];
-        assert!((start[0] - 64.0).abs() < 1e-9 && (start[1] - (320.0 - 304.0 * 6.0 / 112.0)).abs() < 0.1);
-        assert!(end[1] < start[1] && (end[1] - (16.0 + 304.0 * 6.0 / 112.0)).abs() < 0.1, "{end:?}");
+        assert!(
+            (start[0] - 64.0).abs() < 1e-9
+                && (start[1] - (320.0 - 304.0 * 6.0 / 112.0)).abs() < 0.1
+        );
+        assert!(
+            end[1] < start[1] && (end[1] - (16.0 + 304.0 * 6.0 / 112.0)).abs() < 0.1,
+            "{end:?}"
+        );
     }
 
     #[test]
@@ -113,7 +120,8 @@ mod tests {
         let (width, height) = (f64::from(picture.width()), f64::from(picture.height()));
         for shape in &picture.shapes {
             let Shape::Lines { lines, .. } = shape else { panic!("{shape:?}") };
-            let within = |p: &Place| (0.0..=width).contains(&p[0]) && (0.0..=height).contains(&p[1]);
+            let within =
+                |p: &Place| (0.0..=width).contains(&p[0]) && (0.0..=height).contains(&p[1]);
             assert!(lines.iter().flatten().all(within));
         }
     }

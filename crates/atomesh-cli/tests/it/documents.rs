@@ -72,7 +72,11 @@ fn pictures_say_what_they_show() {
     for document in documents() {
         let text = read(&document);
         for words in between(&text, "![", ']') {
-            assert!(words.len() > 15, "{} has a picture without words: {words}", document.display());
+            assert!(
+                words.len() > 15,
+                "{} has a picture without words: {words}",
+                document.display()
+            );
         }
     }
 }
@@ -111,7 +115,8 @@ fn the_manual_has_every_option_and_no_other() {
         }
     }
     // and the reference has what each command's help has
-    let commands_of = between(&commands, "$ atomesh ", '\n').filter_map(|line| line.strip_suffix(" --help"));
+    let commands_of =
+        between(&commands, "$ atomesh ", '\n').filter_map(|line| line.strip_suffix(" --help"));
     let listed: BTreeSet<&str> = commands_of.collect();
     let help = read("crates/atomesh-cli/tests/cmd/help.md");
     let list = help.split("Commands:\n").nth(1).and_then(|rest| rest.split("\n\n").next());

@@ -148,7 +148,10 @@ fn the_command_does_what_the_transcripts_show() {
 
 /// The pictures that a page shows: their files, from its folder.
 fn pictures(page: &str) -> impl Iterator<Item = &str> {
-    page.split("](").skip(1).filter_map(|rest| rest.split(')').next()).filter(|file| file.ends_with(".png"))
+    page.split("](")
+        .skip(1)
+        .filter_map(|rest| rest.split(')').next())
+        .filter(|file| file.ends_with(".png"))
 }
 
 #[test]
@@ -158,7 +161,8 @@ fn the_manual_shows_what_the_command_prints_and_draws() {
     let mut faults = String::new();
     for folder in [docs.clone(), docs.join("tutorials")] {
         let files = fs::read_dir(&folder).unwrap().map(|entry| entry.unwrap().path());
-        let mut pages: Vec<_> = files.filter(|path| path.extension() == Some("md".as_ref())).collect();
+        let mut pages: Vec<_> =
+            files.filter(|path| path.extension() == Some("md".as_ref())).collect();
         pages.sort();
         for page in pages {
             let text = fs::read_to_string(&page).unwrap();
@@ -179,7 +183,11 @@ fn the_manual_shows_what_the_command_prints_and_draws() {
                 match drawn {
                     Ok(bytes) if update => fs::write(&shown, bytes).unwrap(),
                     _ => {
-                        let _ = writeln!(faults, "{}: no block draws {picture} as it is", page.display());
+                        let _ = writeln!(
+                            faults,
+                            "{}: no block draws {picture} as it is",
+                            page.display()
+                        );
                     }
                 }
             }

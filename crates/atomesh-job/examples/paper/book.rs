@@ -58,7 +58,7 @@ impl Book {
     /// The papers' image of that name, if it is there.
     pub fn read(&self, file: &str) -> Result<Option<AnyImage>, Failure> {
         let Some(folder) = self.data.as_ref().filter(|_| self.has(file)) else { return Ok(None) };
-        let (image, _) = read_image(&folder.join(file), &ReadOptions::default(), &mut Silent)?;
+        let image = read_image(&folder.join(file), &ReadOptions::default(), &mut Silent)?;
         Ok(Some(image))
     }
 
@@ -81,7 +81,9 @@ impl Book {
             println!("{name}: {what} {value:.4}");
             write!(self.captions, " {what}: {value:.4}.")?;
             if !(least..=greatest).contains(&value) {
-                return Err(format!("{name}: {what} is {value}; expected {least} to {greatest}").into());
+                return Err(
+                    format!("{name}: {what} is {value}; expected {least} to {greatest}").into()
+                );
             }
         }
         self.captions.push('\n');
@@ -111,12 +113,16 @@ pub fn run(options: &str) -> Result<RunConfig, Failure> {
     while let Some(word) = words.next() {
         let (name, value) = match word.trim_start_matches("--").split_once('=') {
             Some(pair) => pair,
-            None => (word.trim_start_matches("--"), words.next().ok_or("an option without a value")?),
+            None => {
+                (word.trim_start_matches("--"), words.next().ok_or("an option without a value")?)
+            }
         };
         let field = name.replace('-', "_");
         let has = |section: &&(&'static str, &[&str])| section.1.contains(&field.as_str());
-        let section = RunConfig::SECTIONS.iter().find(has).ok_or_else(|| format!("no option --{name}"))?;
-        let is_plain = value.parse::<f64>().is_ok() && name != "size" || matches!(value, "true" | "false");
+        let section =
+            RunConfig::SECTIONS.iter().find(has).ok_or_else(|| format!("no option --{name}"))?;
+        let is_plain =
+            value.parse::<f64>().is_ok() && name != "size" || matches!(value, "true" | "false");
         let value = if is_plain { value.to_owned() } else { format!("{value:?}") };
         writeln!(tables.entry(section.0).or_default(), "{name} = {value}")?;
     }
@@ -144,6 +150,7 @@ pub fn plain(image: &Image<2>) -> Result<Picture, Failure> {
 
 /// Places in sample coordinates as white dots on a field.
 pub fn dots(field: &Image<2>, atoms: Vec<[f64; 2]>) -> Result<Picture, Failure> {
-    let style = Style { edges: false, atoms: true, max_side: 768.0, edge_width: 1.6, ..Style::default() };
+    let style =
+        Style { edges: false, atoms: true, max_side: 768.0, edge_width: 1.6, ..Style::default() };
     Ok(draw_triangles(field, &Mesh::new(atoms, Vec::new())?, &style)?)
 }

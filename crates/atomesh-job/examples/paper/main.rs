@@ -13,6 +13,7 @@ mod phantom;
 mod plane;
 mod potential;
 mod space;
+mod units;
 mod voronoi;
 
 use std::path::PathBuf;
@@ -32,5 +33,6 @@ fn main() -> Result<(), Failure> {
     medical::torso(&mut book)?;
     voronoi::along_faults(&mut book)?;
     voronoi::in_space(&mut book)?;
+    units::section(&mut book)?;
     book.finish()
 }

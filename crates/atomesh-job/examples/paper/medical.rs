@@ -27,7 +27,11 @@ pub fn torso(book: &mut Book) -> Result<(), Failure> {
     let picture = draw_triangles(&image, &outcome.sample_mesh(), &style)?;
     let checked = [
         Checked { name: "mean quality", value: report.shape.q_mean, range: [0.88, 1.0] },
-        Checked { name: "share of the edges that are followed", value: report.alignment.recall, range: [0.75, 1.0] },
+        Checked {
+            name: "share of the edges that are followed",
+            value: report.alignment.recall.unwrap_or(0.0),
+            range: [0.75, 1.0],
+        },
     ];
     book.add("figure-12", "A mesh of that image", OPTIONS, &picture, &checked)
 }

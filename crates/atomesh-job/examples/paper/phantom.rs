@@ -35,7 +35,9 @@ pub fn torso() -> Result<Image<2>, Failure> {
         // the sum of twelve equal numbers is nearly normal
         (0..12)
             .map(|_| {
-                state = state.wrapping_mul(6_364_136_223_846_793_005).wrapping_add(1_442_695_040_888_963_407);
+                state = state
+                    .wrapping_mul(6_364_136_223_846_793_005)
+                    .wrapping_add(1_442_695_040_888_963_407);
                 (state >> 40) as f64 / (1_u64 << 24) as f64
             })
             .sum::<f64>()

@@ -28,7 +28,8 @@ pub fn fault_image(book: &Book) -> Result<Image<2>, Failure> {
 pub fn faults(book: &mut Book) -> Result<(), Failure> {
     let image = fault_image(book)?;
     let [width, height] = image.frame().shape();
-    let checked = [Checked { name: "samples", value: (width * height) as f64, range: [256.0 * 256.0; 2] }];
+    let checked =
+        [Checked { name: "samples", value: (width * height) as f64, range: [256.0 * 256.0; 2] }];
     book.add("figure-1", "An image of faults", "", &plain(&image)?, &checked)?;
 
     let outcome = mesh(GRADED, &image, &Dimension::plane())?;
@@ -36,7 +37,11 @@ pub fn faults(book: &mut Book) -> Result<(), Failure> {
     let picture = draw_triangles(&image, &outcome.sample_mesh(), &Style::default())?;
     let checked = [
         Checked { name: "mean quality", value: report.shape.q_mean, range: [0.9, 1.0] },
-        Checked { name: "share of the features that edges follow", value: report.alignment.recall, range: [0.75, 1.0] },
+        Checked {
+            name: "share of the features that edges follow",
+            value: report.alignment.recall.unwrap_or(0.0),
+            range: [0.75, 1.0],
+        },
     ];
     let caption = "A mesh of variable density that is aligned with the faults";
     book.add("figure-2", caption, GRADED, &picture, &checked)
@@ -57,15 +62,29 @@ pub fn lattice(book: &mut Book) -> Result<(), Failure> {
     // what the paper says of its image holds for that one alone
     let range = if book.has(IMAGE) { [9.2, 10.2] } else { [6.0, 18.0] };
     let checked = [Checked { name: "mean distance", value: mean, range }];
-    let caption = "The nominal distance d(x), 6 to 18 samples, and the lattice that Algorithm 2 makes";
-    book.add("figure-5", caption, "--size 6..18", &dots(&field, start.atoms().to_vec())?, &checked)?;
+    let caption =
+        "The nominal distance d(x), 6 to 18 samples, and the lattice that Algorithm 2 makes";
+    book.add(
+        "figure-5",
+        caption,
+        "--size 6..18",
+        &dots(&field, start.atoms().to_vec())?,
+        &checked,
+    )?;
 
     let settled = filled.settle(&mut Silent)?;
     let fields = prepared.fields();
     let count = start.len() as f64;
     let (before, picture) = total_potential(&image, fields, &start)?;
-    let checked = [Checked { name: "energy per atom", value: before / count, range: [-10.0, 10.0] }];
-    book.add("figure-6", "The total potential field p(x) of the initial lattice", GRADED, &picture, &checked)?;
+    let checked =
+        [Checked { name: "energy per atom", value: before / count, range: [-10.0, 10.0] }];
+    book.add(
+        "figure-6",
+        "The total potential field p(x) of the initial lattice",
+        GRADED,
+        &picture,
+        &checked,
+    )?;
 
     let (after, picture) = total_potential(&image, fields, settled.lattice())?;
     // by pairs, d and β read where the atoms are; the sampled field is within its rounding
@@ -77,7 +96,13 @@ pub fn lattice(book: &mut Book) -> Result<(), Failure> {
         Checked { name: "energy per atom", value: after / atoms, range: [-10.0, before / count] },
         Checked { name: "how far it is from the run's report", value: off, range: [0.0, 0.02] },
     ];
-    book.add("figure-7", "The same when the atoms have moved into valleys", GRADED, &picture, &checked)
+    book.add(
+        "figure-7",
+        "The same when the atoms have moved into valleys",
+        GRADED,
+        &picture,
+        &checked,
+    )
 }
 
 /// The energy of a lattice and its field p(x), atoms on it.
@@ -110,12 +135,15 @@ pub fn flow(book: &mut Book) -> Result<(), Failure> {
     let (mut watch, constant) = (Silent, "--size 8");
     let mut session = Session::new(&mut watch);
     let images = MeshImages::new(image);
-    let answer = atomesh_job::flow::flow(&run(constant)?, &wells, images, &dimension, &mut session)?;
+    let answer =
+        atomesh_job::flow::flow(&run(constant)?, &wells, images, &dimension, &mut session)?;
     let shown = FlowPictureOptions { max_side: 1200.0, ..FlowPictureOptions::default() };
     let picture = answer.picture(&shown, &dimension)?;
     let error = answer.balance(&dimension.flow).relative_error();
-    let checked = [Checked { name: "error of the mass balance", value: error, range: [0.0, 1e-10] }];
-    let caption = "Flow from the upper left to the lower right past faults that let nothing through";
+    let checked =
+        [Checked { name: "error of the mass balance", value: error, range: [0.0, 1e-10] }];
+    let caption =
+        "Flow from the upper left to the lower right past faults that let nothing through";
     let options = "--size 8 --source 16,16 --sink 239,239";
     book.add("figure-8", caption, options, &picture, &checked)
 }

@@ -24,8 +24,14 @@ pub fn pair_functions(book: &mut Book) -> Result<(), Failure> {
     let off = (1..199).map(|i| 0.01 * f64::from(i)).map(|u| (pair::force(u) + slope(u)).abs());
     let checked = [
         Checked { name: "f(1)", value: pair::force(1.0), range: [-1e-15, 1e-15] },
-        Checked { name: "φ(0) · 256/153", value: pair::energy(0.0) * 256.0 / 153.0, range: [1.0 - 1e-12, 1.0 + 1e-12] },
-        Checked { name: "greatest |f + φ′|", value: off.fold(0.0, f64::max), range: [0.0, 1e-6] },
+        Checked {
+            name: "φ(0) · 256/153",
+            value: pair::energy(0.0) * 256.0 / 153.0,
+            range: [1.0 - 1e-12, 1.0 + 1e-12],
+        },
+        Checked {
+            name: "greatest |f + φ′|", value: off.fold(0.0, f64::max), range: [0.0, 1e-6]
+        },
     ];
     let caption = "Force f(u), left, and potential φ(u), right, of two atoms at a distance of u nominal distances";
     book.add("figure-3", caption, "", &picture, &checked)
@@ -54,16 +60,20 @@ pub fn one_atom(book: &mut Book) -> Result<(), Failure> {
         let last = SIDE as f64 - 0.5;
         let bounds = Bounds { min: [-0.5; 2], max: [last; 2] };
         let squares = voronoi(&Delaunay::<2>::new(), &sites, bounds, &mut Silent)?;
-        let style = Style { brightness: 1.0, edge_color: [0; 3], edge_pixels: 16.0, ..Style::default() };
+        let style =
+            Style { brightness: 1.0, edge_color: [0; 3], edge_pixels: 16.0, ..Style::default() };
         let picture = draw_polygons(&image, &squares, &style)?;
 
         let at = |x: usize| f64::from(field[SIDE * (SIDE / 2) + x]);
         let ring = at(SIDE / 2 + distance as usize);
         let expected = pair::energy(1.0);
-        let checked = [
-            Checked { name: "field at distance d over φ(1)", value: ring / expected, range: [1.0 - 1e-6, 1.0 + 1e-6] },
-        ];
-        let caption = format!("What one atom adds to a sampled potential field where d = {distance}");
+        let checked = [Checked {
+            name: "field at distance d over φ(1)",
+            value: ring / expected,
+            range: [1.0 - 1e-6, 1.0 + 1e-6],
+        }];
+        let caption =
+            format!("What one atom adds to a sampled potential field where d = {distance}");
         book.add(name, &caption, "", &picture, &checked)?;
     }
     Ok(())

@@ -27,7 +27,11 @@ pub fn volume(book: &mut Book) -> Result<(), Failure> {
     let picture = draw_slices(&image, &outcome.sample_mesh(), middle, &style)?;
     let checked = [
         Checked { name: "mean quality", value: report.shape.q_mean, range: [0.7, 1.0] },
-        Checked { name: "share of the features that faces follow", value: report.alignment.recall, range: [0.5, 1.0] },
+        Checked {
+            name: "share of the features that faces follow",
+            value: report.alignment.recall.unwrap_or(0.0),
+            range: [0.5, 1.0],
+        },
     ];
     let caption = "Slices through a mesh of tetrahedra that is aligned with faults and horizons";
     book.add("figure-9", caption, OPTIONS, &picture, &checked)

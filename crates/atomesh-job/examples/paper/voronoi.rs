@@ -13,7 +13,13 @@ use crate::plane::fault_image;
 pub fn along_faults(book: &mut Book) -> Result<(), Failure> {
     let section = SynthOptions { seed: 2, ..SynthOptions::new([256, 200]) };
     let section = synthesize(Scene::Section, &section)?.image;
-    polygons(book, "figure-2a-of-2002", "along faults", &fault_image(book)?, "--mesh voronoi --size 8")?;
+    polygons(
+        book,
+        "figure-2a-of-2002",
+        "along faults",
+        &fault_image(book)?,
+        "--mesh voronoi --size 8",
+    )?;
     let both = "--mesh voronoi --size 8 --features faults,horizons:0.6";
     polygons(book, "figure-2b-of-2002", "along faults and horizons", &section, both)
 }
@@ -29,9 +35,11 @@ fn polygons(
     let cells = outcome.sample_cells().ok_or("no cells")?;
     let report = outcome.cells_report(&mut Silent)?.ok_or("no report")?;
     let picture = draw_polygons(image, &cells, &Style::default())?;
-    let checked = [
-        Checked { name: "share of the features that sides follow", value: report.alignment.recall, range: [0.5, 1.0] },
-    ];
+    let checked = [Checked {
+        name: "share of the features that sides follow",
+        value: report.alignment.recall.unwrap_or(0.0),
+        range: [0.5, 1.0],
+    }];
     book.add(name, &format!("Voronoi cells {where_}"), options, &picture, &checked)
 }
 
@@ -45,8 +53,16 @@ pub fn in_space(book: &mut Book) -> Result<(), Failure> {
     let report = outcome.cells_report(&mut Silent)?.ok_or("no report")?;
     let middle = image.frame().shape().map(|n| n / 2);
     let picture = draw_polyhedra(&image, &cells, middle, &Style::default())?;
-    let checked = [
-        Checked { name: "share of the faults that faces follow", value: report.alignment.recall, range: [0.7, 1.0] },
-    ];
-    book.add("figure-3-of-2002", "Voronoi cells in space, along faults", options, &picture, &checked)
+    let checked = [Checked {
+        name: "share of the faults that faces follow",
+        value: report.alignment.recall.unwrap_or(0.0),
+        range: [0.7, 1.0],
+    }];
+    book.add(
+        "figure-3-of-2002",
+        "Voronoi cells in space, along faults",
+        options,
+        &picture,
+        &checked,
+    )
 }

@@ -186,9 +186,10 @@ fn held<const D: usize>(mesh: &Mesh<D>, shape: [usize; D], samples: &Samples) ->
 fn by_definition<const D: usize>(mesh: &Mesh<D>, frame: &Frame<D>, samples: &Samples) -> [f64; 3] {
     let held = held(mesh, frame.shape(), samples);
     let mean_of = |of: &dyn Fn(&Held) -> bool| {
-        let sums = held.iter().filter(|h| of(h)).fold([0.0; 2], |[value, weight], h| {
-            [value + h.weight * h.value, weight + h.weight]
-        });
+        let sums = held
+            .iter()
+            .filter(|h| of(h))
+            .fold([0.0; 2], |[value, weight], h| [value + h.weight * h.value, weight + h.weight]);
         sums[0] / sums[1]
     };
     let mean = mean_of(&|_| true);
