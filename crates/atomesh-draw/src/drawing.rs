@@ -2,6 +2,7 @@
 //!
 //! The functions behind it are compiled in this crate, once for each dimension.
 
+use atomesh::geometry::Point;
 use atomesh::image::Image;
 use atomesh::mesh::{Mesh, PolyMesh};
 
@@ -9,8 +10,8 @@ use crate::error::DrawError;
 use crate::flow::{FlowPicture, FlowStyle, draw_flow, draw_flow_slices};
 use crate::parts::{PartsPicture, draw_parts, draw_parts_slices};
 use crate::picture::Picture;
-use crate::plane::{draw_polygons, draw_triangles};
-use crate::slices::{draw_polyhedra, draw_slices};
+use crate::plane::{draw_atoms, draw_polygons, draw_triangles};
+use crate::slices::{draw_atoms_slices, draw_polyhedra, draw_slices};
 use crate::style::Style;
 
 /// How meshes of `D` dimensions, in sample coordinates, are drawn.
@@ -20,6 +21,8 @@ pub struct Drawing<const D: usize> {
     pub mesh: fn(&Image<D>, &Mesh<D>, &Style) -> Result<Picture, DrawError>,
     /// Draws Voronoi cells over their image.
     pub cells: fn(&Image<D>, &PolyMesh<D>, &Style) -> Result<Picture, DrawError>,
+    /// Draws atoms alone: in the plane those of the first list, in space those of the list of each slice, by its normal.
+    pub atoms: fn(&Image<D>, &[Vec<Point<D>>; D], &Style) -> Result<Picture, DrawError>,
     /// Draws parts of cells.
     pub parts: fn(&PartsPicture<'_, D>, &Style) -> Result<Picture, DrawError>,
     /// Draws flow.
@@ -30,7 +33,13 @@ impl Drawing<2> {
     /// [`draw_triangles`], [`draw_polygons`], [`draw_parts`] and [`draw_flow`].
     #[inline(never)] // inlined elsewhere, it would have all functions compiled there
     pub fn plane() -> Self {
-        Self { mesh: draw_triangles, cells: draw_polygons, parts: draw_parts, flow: draw_flow }
+        Self {
+            mesh: draw_triangles,
+            cells: draw_polygons,
+            atoms: |image, [atoms, _], style| draw_atoms(image, atoms, style),
+            parts: draw_parts,
+            flow: draw_flow,
+        }
     }
 }
 
@@ -42,6 +51,9 @@ impl Drawing<3> {
             mesh: |image, mesh, style| draw_slices(image, mesh, middle(image), &with_atoms(style)),
             cells: |image, mesh, style| {
                 draw_polyhedra(image, mesh, middle(image), &with_atoms(style))
+            },
+            atoms: |image, atoms, style| {
+                draw_atoms_slices(image, atoms.each_ref().map(Vec::as_slice), middle(image), style)
             },
             parts: draw_parts_slices,
             flow: |flow, style, flow_style| draw_flow_slices(flow, None, style, flow_style),

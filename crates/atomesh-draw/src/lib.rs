@@ -6,7 +6,7 @@
 //! Voronoi cells, [`draw_curves`] plots functions, as in his figure 3. [`draw_flow`] and [`draw_flow_slices`] show what
 //! flows on a mesh, [`draw_parts`] and [`draw_parts_slices`] parts of its cells. [`Drawing`] holds them for callers
 //! that are generic over the dimension. All return a [`Picture`], a list of what to draw and where, which becomes PNG
-//! or SVG; [`ReportPage`] is a report with its pictures as one HTML file. The same input gives the same bytes.
+//! or SVG; [`encode_movie`] makes an animated PNG of several; [`ReportPage`] is a report with its pictures as one HTML file. The same input gives the same bytes.
 //!
 //! Meshes are given in *sample coordinates*: lattice coordinates divided by the grid's step. Row 0 is
 //! at the top, x grows to the right. A sample covers the square around its centre, so a picture reaches
@@ -20,6 +20,7 @@ mod error;
 mod flow;
 mod label;
 mod legend;
+mod movie;
 mod page;
 mod panel;
 mod parts;
@@ -41,9 +42,10 @@ pub use error::DrawError;
 pub use flow::{
     FlowCells, FlowLine, FlowPicture, FlowStyle, FlowWell, draw_flow, draw_flow_slices,
 };
+pub use movie::{MovieFrame, encode_movie};
 pub use page::ReportPage;
 pub use parts::{PartsPicture, draw_parts, draw_parts_slices};
 pub use picture::{Picture, PictureFormat};
-pub use plane::{draw_polygons, draw_triangles};
-pub use slices::{draw_polyhedra, draw_slices};
+pub use plane::{draw_atoms, draw_polygons, draw_triangles};
+pub use slices::{draw_atoms_slices, draw_polyhedra, draw_slices};
 pub use style::{Color, Style};

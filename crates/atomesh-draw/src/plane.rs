@@ -51,6 +51,19 @@ pub fn draw_polygons(
     draw(image, &Net { points: mesh.points(), edges, atoms: mesh.centers(), edge }, style)
 }
 
+/// Draws atoms alone over an image, in sample coordinates; the picture is as large as allowed.
+///
+/// # Errors
+/// As [`draw_triangles`].
+pub fn draw_atoms(
+    image: &Image<2>,
+    atoms: &[Point<2>],
+    style: &Style,
+) -> Result<Picture, DrawError> {
+    let style = Style { edges: false, atoms: true, ..style.clone() };
+    draw(image, &Net { points: &[], edges: Vec::new(), atoms, edge: None }, &style)
+}
+
 /// What is drawn over an image.
 struct Net<'a> {
     points: &'a [Point<2>],

@@ -11,7 +11,15 @@ use crate::style::Color;
 const LINES_PER_PATH: usize = 2048;
 
 /// A picture of that width and height as an RGB PNG.
-pub(crate) fn encode([width, height]: [u32; 2], shapes: &[Shape]) -> Result<Vec<u8>, DrawError> {
+pub(crate) fn encode(size: [u32; 2], shapes: &[Shape]) -> Result<Vec<u8>, DrawError> {
+    let pixmap = pixels(size, shapes)?;
+    let rgb: Vec<u8> =
+        pixmap.pixels().iter().flat_map(|p| [p.red(), p.green(), p.blue()]).collect();
+    rgb_png(size[0], size[1], png::ColorType::Rgb, &rgb)
+}
+
+/// The pixels of a picture of that width and height, on white.
+pub(crate) fn pixels([width, height]: [u32; 2], shapes: &[Shape]) -> Result<Pixmap, DrawError> {
     let mut pixmap = Pixmap::new(width, height).ok_or_else(|| DrawError::Png {
         reason: format!("{width} × {height} pixels are too many"),
     })?;
@@ -19,9 +27,7 @@ pub(crate) fn encode([width, height]: [u32; 2], shapes: &[Shape]) -> Result<Vec<
     for shape in shapes {
         draw(&mut pixmap, shape);
     }
-    let rgb: Vec<u8> =
-        pixmap.pixels().iter().flat_map(|p| [p.red(), p.green(), p.blue()]).collect();
-    rgb_png(width, height, png::ColorType::Rgb, &rgb)
+    Ok(pixmap)
 }
 
 /// A raster as a grey PNG of its own size.

@@ -49,6 +49,38 @@ pub fn draw_polyhedra(
     draw(image, mesh, at, style)
 }
 
+/// Draws atoms alone over the slices of an image, in sample coordinates: of each slice, by the axis that it is normal to,
+/// those that are given for it. The picture is as large as allowed.
+///
+/// # Errors
+/// As [`draw_slices`].
+pub fn draw_atoms_slices(
+    image: &Image<3>,
+    atoms: [&[Point<3>]; 3],
+    at: [usize; 3],
+    style: &Style,
+) -> Result<Picture, DrawError> {
+    let style = Style { edges: false, atoms: true, ..style.clone() };
+    draw(image, &AtomsAtSlices(atoms), at, &style)
+}
+
+/// Atoms near each slice, without a mesh.
+struct AtomsAtSlices<'a>([&'a [Point<3>]; 3]);
+
+impl Sliced for AtomsAtSlices<'_> {
+    fn cuts(&self, _: usize, _: Level) -> Vec<[Point<3>; 2]> {
+        Vec::new()
+    }
+
+    fn atoms_near(&self, normal: usize, _: f64) -> Vec<Point<3>> {
+        self.0[normal].to_vec()
+    }
+
+    fn edge(&self, _: &Point<3>) -> Option<f64> {
+        None
+    }
+}
+
 fn draw(
     image: &Image<3>,
     mesh: &dyn Sliced,
@@ -114,9 +146,8 @@ impl Scene<'_> {
 
     fn atoms(&self, panel: &Panel) -> Vec<Place> {
         let normal = panel.slice.normal;
-        let value = self.at[normal] as f64;
-        let near = |p: &&Point<3>| (p[normal] - value).abs() <= 1.0;
-        self.mesh.atoms().iter().filter(near).map(|p| panel.place(p)).collect()
+        let near = self.mesh.atoms_near(normal, self.at[normal] as f64);
+        near.iter().map(|p| panel.place(p)).collect()
     }
 }
 
@@ -124,8 +155,8 @@ impl Scene<'_> {
 trait Sliced {
     /// The lines in which a plane cuts the mesh's faces.
     fn cuts(&self, normal: usize, level: Level) -> Vec<[Point<3>; 2]>;
-    /// The atoms.
-    fn atoms(&self) -> &[Point<3>];
+    /// The atoms near a plane.
+    fn atoms_near(&self, normal: usize, value: f64) -> Vec<Point<3>>;
     /// The typical length of an edge, for samples with sides `step`.
     fn edge(&self, step: &Point<3>) -> Option<f64>;
 }
@@ -136,8 +167,8 @@ impl Sliced for Mesh<3> {
         faces.flat_map(|face| level.cut(normal, &face.map(|i| self.points()[i as usize]))).collect()
     }
 
-    fn atoms(&self) -> &[Point<3>] {
-        self.points()
+    fn atoms_near(&self, normal: usize, value: f64) -> Vec<Point<3>> {
+        within_a_sample(self.points(), normal, value)
     }
 
     fn edge(&self, step: &Point<3>) -> Option<f64> {
@@ -152,8 +183,8 @@ impl Sliced for PolyMesh<3> {
         (0..self.face_count()).flat_map(cut).collect()
     }
 
-    fn atoms(&self) -> &[Point<3>] {
-        self.centers()
+    fn atoms_near(&self, normal: usize, value: f64) -> Vec<Point<3>> {
+        within_a_sample(self.centers(), normal, value)
     }
 
     /// The distance between neighbouring sites, which compares with the edges of tetrahedra.
@@ -167,6 +198,10 @@ impl Sliced for PolyMesh<3> {
         };
         median(faces.map(length).collect())
     }
+}
+
+fn within_a_sample(atoms: &[Point<3>], normal: usize, value: f64) -> Vec<Point<3>> {
+    atoms.iter().filter(|p| (p[normal] - value).abs() <= 1.0).copied().collect()
 }
 
 /// The faces with corners on both sides of the plane, each once, in order.

@@ -6,7 +6,7 @@ use std::path::{Path, PathBuf};
 use std::time::{Duration, Instant};
 
 use atomesh::run::Warning;
-use atomesh::watch::{Phase, Watch};
+use atomesh::watch::{AtomsView, Phase, Watch};
 use atomesh_io::image::ReadNote;
 use atomesh_io::output_group::OutputGroup;
 
@@ -271,6 +271,13 @@ impl Watch for Session<'_> {
         match &mut self.ear {
             Ear::Watch(watch) => watch.step(phase, done, energy),
             Ear::Listener(listener) => listener.step(phase, done, energy),
+        }
+    }
+
+    fn atoms(&mut self, phase: Phase, atoms: AtomsView<'_>) {
+        match &mut self.ear {
+            Ear::Watch(watch) => watch.atoms(phase, atoms),
+            Ear::Listener(listener) => listener.atoms(phase, atoms),
         }
     }
 }

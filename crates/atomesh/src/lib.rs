@@ -25,9 +25,9 @@ pub mod conform;
 pub mod improve;
 pub mod edit;
 pub mod features;
-pub mod cluster;
 pub mod sample;
 pub mod voronoi;
+pub mod cluster;
 pub mod measure;
 pub mod run;
 

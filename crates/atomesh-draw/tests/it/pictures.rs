@@ -4,7 +4,10 @@ use std::path::Path;
 
 use atomesh::image::{Frame, Image, Samples, Units};
 use atomesh::mesh::Mesh;
-use atomesh_draw::{DrawError, Picture, PictureFormat, Style, draw_slices, draw_triangles};
+use atomesh_draw::{
+    DrawError, FlowCells, MovieFrame, PartsPicture, Picture, PictureFormat, Style, draw_atoms,
+    draw_atoms_slices, draw_parts, draw_slices, draw_triangles, encode_movie,
+};
 use proptest::prelude::*;
 
 /// The pixels of a PNG, row by row.
@@ -264,6 +267,88 @@ fn places_and_styles_without_a_meaning_are_refused() {
         "\"a.gif\" is not the name of a picture; expected .png or .svg"
     );
     assert_eq!(PictureFormat::of(Path::new("a.SVG")), Ok(PictureFormat::Svg));
+}
+
+/// The frames of an animated PNG as a program shows them, each over the one before, and how long they stay.
+fn frames_of(bytes: &[u8]) -> Vec<(Vec<[u8; 4]>, u16)> {
+    let mut reader = png::Decoder::new(std::io::Cursor::new(bytes)).read_info().unwrap();
+    let control = reader.info().animation_control.unwrap();
+    assert_eq!(control.num_plays, 0, "again and again");
+    let mut shown: Vec<[u8; 4]> = Vec::new();
+    let mut frames = Vec::new();
+    for _ in 0..control.num_frames {
+        let mut rgba = vec![0; reader.output_buffer_size().unwrap()];
+        reader.next_frame(&mut rgba).unwrap();
+        let frame = *reader.info().frame_control().unwrap();
+        let new: &[[u8; 4]] = rgba.as_chunks().0;
+        shown.resize(new.len(), [0; 4]);
+        let opaque = shown.iter_mut().zip(new).filter(|(_, new)| new[3] == 255);
+        opaque.for_each(|(shown, new)| *shown = *new);
+        frames.push((shown.clone(), frame.delay_num));
+    }
+    frames
+}
+
+#[test]
+fn a_movie_shows_its_pictures_one_after_another() {
+    let style = Style { max_side: 90.0, ..Style::default() };
+    let image = slope(9, 9);
+    let at = |x: f64| draw_atoms(&image, &[[x, 4.0]], &style).unwrap();
+    let places = [1.0, 4.0, 4.0, 7.5];
+    let frame = |number: usize| -> Result<MovieFrame, DrawError> {
+        Ok(MovieFrame { picture: at(places[number]), milliseconds: 10 + number as u16 })
+    };
+    let movie = encode_movie(4, frame).unwrap();
+    let frames = frames_of(&movie);
+    assert_eq!(frames.len(), 4);
+    for (number, ((rgba, delay), place)) in frames.iter().zip(places).enumerate() {
+        let alone = Pixels::of(&at(place));
+        assert!(rgba.iter().zip(&alone.rgb).all(|(shown, alone)| shown[..3] == *alone), "{number}");
+        assert_eq!(*delay, 10 + number as u16);
+    }
+    assert_eq!(encode_movie(4, frame).unwrap(), movie);
+    // a frame like the one before takes little
+    assert!(encode_movie(3, |number| frame([0, 1, 3][number])).unwrap().len() + 400 > movie.len());
+    assert!(matches!(encode_movie(0, frame), Err(DrawError::Png { .. })));
+    let fails = |number: usize| {
+        if number == 1 { Err(DrawError::Format { path: "x".into() }) } else { frame(0) }
+    };
+    assert_eq!(encode_movie(2, fails), Err(DrawError::Format { path: "x".into() }));
+}
+
+#[test]
+fn atoms_of_each_slice_are_shown_in_its_panel_alone() {
+    let image = ramp([8, 8, 8]);
+    let style = Style { atom_color: [255, 0, 255], ..slices_style() };
+    let lists = [vec![[4.0, 2.0, 2.0]], vec![], vec![]];
+    let count = |lists: [&[[f64; 3]]; 3]| {
+        let pixels = Pixels::of(&draw_atoms_slices(&image, lists, [4; 3], &style).unwrap());
+        pixels.rgb.iter().filter(|rgb| **rgb == [255, 0, 255]).count()
+    };
+    let one = count(lists.each_ref().map(Vec::as_slice));
+    let all = count([&lists[0], &lists[0], &lists[0]]);
+    assert!(one > 0 && all > 2 * one, "{one}, {all}");
+}
+
+#[test]
+fn parts_tint_the_image_each_in_its_colour_and_have_dark_borders() {
+    let (image, mesh) = (slope(9, 9), square(9, 9));
+    let style = Style { edges: false, ..Style::default() };
+    let draw = |parts: &[i32], image| {
+        let picture = PartsPicture { cells: FlowCells::Simplices(&mesh), image, parts };
+        draw_parts(&picture, &style).map(|picture| Pixels::of(&picture))
+    };
+    let pixels = draw(&[1, 2], Some(&image)).unwrap();
+    let side = pixels.width as f64;
+    let [lower, upper] = [pixels.at(0.8 * side, 0.3 * side), pixels.at(0.3 * side, 0.8 * side)];
+    let is_grey = |[r, g, b]: [u8; 3]| r == g && g == b;
+    assert!(!is_grey(lower) && !is_grey(upper) && lower != upper, "{lower:?}, {upper:?}");
+    let one = draw(&[1, 1], Some(&image)).unwrap();
+    let on_diagonal = |pixels: &Pixels| pixels.at(0.5 * side, 0.5 * side);
+    assert!(on_diagonal(&pixels) != on_diagonal(&one), "a border on the diagonal");
+    assert!(draw(&[1, 2], None).is_ok());
+    let odd = draw(&[1], Some(&image)).err();
+    assert_eq!(odd, Some(DrawError::Count { what: "parts", found: 1, expected: 2 }));
 }
 
 #[test]

@@ -7,6 +7,7 @@ use atomesh_io::mesh::{LoadedMesh, OwnedField, World};
 
 use super::MeshSummary;
 use super::figures::{Figures, Measured, RunPage};
+use super::movie::Recording;
 use super::outputs::Outputs;
 use super::write::{Writing, cells_of_wells};
 use crate::dimension::Dimension;
@@ -15,6 +16,20 @@ use crate::files::write_bytes;
 use crate::options::RunConfig;
 use crate::sample::Property;
 use crate::session::Session;
+
+/// What outputs need beside the mesh.
+pub(super) struct Wanted<'a, const D: usize> {
+    /// The atoms of the run.
+    pub recording: Option<&'a Recording<D>>,
+    /// Whether the shape is measured though no report asks for it.
+    pub measures_shape: bool,
+}
+
+impl<const D: usize> Default for Wanted<'_, D> {
+    fn default() -> Self {
+        Self { recording: None, measures_shape: false }
+    }
+}
 
 /// A mesh that a run has made, and what it was made from.
 #[derive(Clone, Copy, Debug)]
@@ -87,7 +102,12 @@ impl<const D: usize> MadeMesh<'_, D> {
         if outputs.needs_image() && self.image.is_none() {
             return Err(JobError::misuse("pictures and reports need the image; expected it too"));
         }
-        self.write_outputs(&outputs, false, dimension, session)
+        if let Some(path) = &outputs.movie {
+            let message = "a movie shows a run, and this one is over";
+            let advice = "`atomesh mesh --movie` makes it with the mesh";
+            return Err(JobError::misuse(message).advise(advice).about(path));
+        }
+        self.write_outputs(&outputs, Wanted::default(), dimension, session)
     }
 
     /// The report, with all that is measured against the image.
@@ -106,24 +126,26 @@ impl<const D: usize> MadeMesh<'_, D> {
         Ok(figures.json(self.run, self.outcome, session))
     }
 
-    /// Measures as far as the outputs or `measures_shape` ask for it, and writes the outputs together.
+    /// Measures as far as is asked for, and writes the outputs together.
     pub(super) fn write_outputs(
         &self,
         outputs: &Outputs,
-        measures_shape: bool,
+        wanted: Wanted<'_, D>,
         dimension: &Dimension<D>,
         session: &mut Session<'_>,
     ) -> Result<MeshSummary, JobError> {
         let Self { run, outcome, image, world, properties } = *self;
         let measured = match image {
             Some(image) if outputs.needs_report() => Measured::All(image),
-            _ if measures_shape => Measured::Shape,
+            _ if wanted.measures_shape => Measured::Shape,
             _ => Measured::Nothing,
         };
         let figures = Figures::new(run, outcome, measured, dimension.tools, session)?;
         let tagged = session.write_together(|group, session| {
             let outputs = &outputs.staged(group)?;
-            let writing = Writing { run, outputs, outcome, world, properties, dimension };
+            let recording = wanted.recording;
+            let writing =
+                Writing { run, outputs, outcome, world, properties, recording, dimension };
             let tagged = writing.write(image, session)?;
             self.write_about(&writing, &figures, session)?;
             Ok(tagged)

@@ -8,6 +8,7 @@ mod figures;
 mod format;
 mod inputs;
 mod made;
+mod movie;
 mod outputs;
 mod phases;
 mod refusal;
@@ -34,6 +35,8 @@ use crate::error::JobError;
 use crate::memory;
 use crate::options::RunConfig;
 use crate::session::Session;
+use made::Wanted;
+use movie::{Recorder, Recording};
 use outputs::Outputs;
 
 /// Makes b(x), d(x) and β(x), and gives the image back. Memory is limited to what is available.
@@ -83,8 +86,22 @@ pub fn meshed<const D: usize>(
     prepared: Prepared<D>,
     session: &mut Session<'_>,
 ) -> Result<Outcome<D>, JobError> {
+    recorded(run, prepared, None, session)
+}
+
+/// The same, with its atoms recorded if there is to be a movie.
+fn recorded<const D: usize>(
+    run: &RunConfig,
+    prepared: Prepared<D>,
+    recording: Option<&mut Recording<D>>,
+    session: &mut Session<'_>,
+) -> Result<Outcome<D>, JobError> {
     let said = prepared.warnings().len();
-    let outcome = prepared.run(session).map_err(|e| refusal(run, e))?;
+    let outcome = match recording {
+        Some(recording) => prepared.run(&mut Recorder { recording, session }),
+        None => prepared.run(session),
+    };
+    let outcome = outcome.map_err(|e| refusal(run, e))?;
     for warning in &outcome.warnings()[said..] {
         session.say(run.input.shown(), warning);
     }
@@ -195,8 +212,10 @@ pub(crate) fn expect_image<const D: usize>(
     let images = MeshImages::read_fields(run, image, dimension, session)?;
     let samples = images.image.samples();
     // reports and pictures need the image to the end
-    let is_kept =
-        run.output.report.is_some() || run.output.html.is_some() || run.output.picture.is_some();
+    let RunConfig { output, .. } = run;
+    let is_kept = [&output.report, &output.html, &output.picture, &output.movie]
+        .into_iter()
+        .any(Option::is_some);
     let image_bytes = if is_kept { samples.len() * samples.sample_size() } else { 0 } as u64;
     let (prepared, _) = prepare(run, images, dimension, session)?;
     let estimate = prepared.estimate();
@@ -235,9 +254,14 @@ impl FileRun<'_> {
         let world = images.world.clone();
         let (prepared, image) = prepare(run, images, dimension, session)?;
         let image = outputs.needs_image().then_some(image);
-        let outcome = meshed(run, prepared, session)?;
+        let units = run.lattice.units.unwrap_or_default();
         let image = image.as_ref();
+        let mut recording =
+            image.filter(|_| outputs.movie.is_some()).map(|image| Recording::new(image, units));
+        let outcome = recorded(run, prepared, recording.as_mut(), session)?;
         let made = MadeMesh { run, outcome: &outcome, image, world: &world, properties: &[] };
-        made.write_outputs(outputs, self.options.measures_shape, dimension, session)
+        let wanted =
+            Wanted { recording: recording.as_ref(), measures_shape: self.options.measures_shape };
+        made.write_outputs(outputs, wanted, dimension, session)
     }
 }

@@ -21,6 +21,8 @@ pub(super) struct Outputs {
     pub connections: Option<ConnectionFiles>,
     pub picture: Option<PictureFile>,
     pub backdrop: Backdrop,
+    /// The movie of the run.
+    pub movie: Option<PathBuf>,
     pub report: Option<PathBuf>,
     /// The report as a page.
     pub html: Option<PathBuf>,
@@ -56,6 +58,7 @@ impl Outputs {
         let format = OutputFormat::of(&mesh, is_voronoi, msh)?;
         let connections = connections(options, is_voronoi)?;
         let picture = PictureFile::of(options.picture.as_ref())?;
+        files::check_extension(options.movie.as_ref(), "png")?;
         if let Some(path) = &options.write_potential {
             files::check_potential(path)?;
         }
@@ -82,6 +85,7 @@ impl Outputs {
             connections,
             picture,
             backdrop: options.picture_of.unwrap_or_default(),
+            movie: options.movie.clone(),
             report,
             html,
             potential: options.write_potential.clone(),
@@ -102,6 +106,7 @@ impl Outputs {
             mesh: files::stage(&self.mesh, group)?,
             connections: self.connections.as_ref().map(|f| staged_list(f, group)).transpose()?,
             picture: self.picture.as_ref().map(|p| p.staged(group)).transpose()?,
+            movie: files::stage_any(&self.movie, group)?,
             report: files::stage_any(&self.report, group)?,
             html: files::stage_any(&self.html, group)?,
             potential: files::stage_any(&self.potential, group)?,
@@ -111,9 +116,14 @@ impl Outputs {
         })
     }
 
+    /// Whether something is drawn over an image.
+    pub fn is_drawn(&self) -> bool {
+        self.picture.is_some() || self.movie.is_some()
+    }
+
     /// Whether the image is still needed after the atoms have felt it.
     pub fn needs_image(&self) -> bool {
-        self.picture.is_some() || self.needs_report()
+        self.is_drawn() || self.needs_report()
     }
 
     /// Whether the mesh is to be measured against the features and the image.
@@ -129,7 +139,8 @@ impl Outputs {
     pub fn check(&self, run: &RunConfig, session: &mut Session<'_>) -> Result<(), JobError> {
         let picture = self.picture.as_ref().map(|picture| &picture.path);
         let (report, html) = (self.report.as_ref(), self.html.as_ref());
-        let others = [Some(&self.mesh), picture, report, html, self.potential.as_ref()];
+        let movie = self.movie.as_ref();
+        let others = [Some(&self.mesh), picture, movie, report, html, self.potential.as_ref()];
         let others = others.into_iter().flatten().map(PathBuf::as_path);
         let tables = self.connections.iter().flat_map(ConnectionFiles::paths);
         let all = others.chain(tables).chain(self.config.as_deref());

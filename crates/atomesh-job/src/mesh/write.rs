@@ -13,9 +13,11 @@ use atomesh_io::mesh::cells::{CellData, NO_CELL};
 use atomesh_io::mesh::{MeshData, MeshFormat, Provenance, Sections, World};
 
 use super::format::OutputFormat;
+use super::movie::Recording;
 use super::outputs::Outputs;
 use crate::dimension::Dimension;
 use crate::error::JobError;
+use crate::files::write_bytes;
 use crate::images::is_z_up;
 use crate::options::{Backdrop, RunConfig};
 use crate::sample::{Property, cell_fields};
@@ -39,6 +41,8 @@ pub(super) struct Writing<'a, const D: usize> {
     pub world: &'a World,
     /// Properties of the cells.
     pub properties: &'a [Property],
+    /// The atoms of the run, for a movie.
+    pub recording: Option<&'a Recording<D>>,
     pub dimension: &'a Dimension<D>,
 }
 
@@ -52,16 +56,10 @@ impl<const D: usize> Writing<'_, D> {
         image: Option<&Image<D>>,
         session: &mut Session<'_>,
     ) -> Result<Option<Tagged>, JobError> {
-        if let (Some(file), Some(image)) = (&self.outputs.picture, image) {
+        if let (true, Some(image)) = (self.outputs.is_drawn(), image) {
             session.begin(Phase::Draw);
-            let style = self.style();
             let backdrop = self.backdrop()?;
-            let image = backdrop.as_ref().unwrap_or(image);
-            let picture = match self.outcome.sample_cells() {
-                Some(cells) => (self.dimension.drawing.cells)(image, &cells, &style),
-                None => (self.dimension.drawing.mesh)(image, &self.outcome.sample_mesh(), &style),
-            };
-            file.write(&picture.map_err(JobError::content)?)?;
+            self.draw(backdrop.as_ref().unwrap_or(image), session)?;
         }
         session.begin(Phase::Write);
         if let Some(path) = &self.outputs.potential {
@@ -72,6 +70,23 @@ impl<const D: usize> Writing<'_, D> {
             OutputFormat::Simplices(format) => self.write_simplices(format, &provenance, session),
             _ => self.write_voronoi(&provenance, session).map(|()| None),
         }
+    }
+
+    /// Draws the picture and the movie over that image.
+    fn draw(&self, image: &Image<D>, session: &mut Session<'_>) -> Result<(), JobError> {
+        let style = self.style();
+        if let Some(file) = &self.outputs.picture {
+            let picture = match self.outcome.sample_cells() {
+                Some(cells) => (self.dimension.drawing.cells)(image, &cells, &style),
+                None => (self.dimension.drawing.mesh)(image, &self.outcome.sample_mesh(), &style),
+            };
+            file.write(&picture.map_err(JobError::content)?)?;
+        }
+        if let (Some(path), Some(recording)) = (&self.outputs.movie, self.recording) {
+            let movie = recording.encoded(self.outcome, image, &style, self.dimension, session)?;
+            write_bytes(path, &movie)?;
+        }
+        Ok(())
     }
 
     /// How the mesh is drawn.

@@ -73,10 +73,15 @@ section! {
         #[arg(long, value_name = "PICTURE")]
         pub picture: PathBuf,
         /// What the picture shows behind the mesh: the image, the potential, the nominal distance, or the density of
-        /// features, smoothed over the greatest nominal distance. Needs --picture. Default: image
+        /// features, smoothed over the greatest nominal distance. Needs --picture or --movie. Default: image
         #[arg(long, value_name = "WHAT",
             value_parser = named::<Backdrop>(&["image", "potential", "distance", "density"]))]
         pub picture_of: Backdrop,
+        /// Movie of the run, an animated .png: atoms on their way to the features over what --picture-of names, at most 100
+        /// steps, and at last the mesh; sides of up to 640 pixels. In 3-D, the atoms within half an edge length of the three
+        /// slices through the middle, up to 900 pixels
+        #[arg(long, value_name = "PICTURE")]
+        pub movie: PathBuf,
         /// Figures of the mesh (shape, alignment, fidelity) and of the run, as JSON; as a page if the name ends
         /// in .html
         #[arg(long, value_name = "JSON")]
@@ -92,8 +97,8 @@ section! {
 }
 
 impl OutputOptions {
-    pub(crate) fn files_mut(&mut self) -> [Option<&mut PathBuf>; 6] {
-        let Self { output, connections, picture, report, html, write_potential, .. } = self;
-        [output, connections, picture, report, html, write_potential].map(Option::as_mut)
+    pub(crate) fn files_mut(&mut self) -> [Option<&mut PathBuf>; 7] {
+        let Self { output, connections, picture, movie, report, html, write_potential, .. } = self;
+        [output, connections, picture, movie, report, html, write_potential].map(Option::as_mut)
     }
 }
