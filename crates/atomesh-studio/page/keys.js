@@ -65,7 +65,7 @@ export function bindKeys(app) {
 export function showKeys(table) {
   for (const { key, shown, does } of [...KEYS, ...HANDS]) {
     const row = table.insertRow();
-    row.insertCell().textContent = shown ?? key.replace("+", " + ");
+    row.insertCell().textContent = shown ?? key.replace(/(?<=\w)\+(?=\w)/, " + ");
     row.insertCell().textContent = does;
   }
 }

@@ -142,7 +142,7 @@ export class View {
     const at = app.dimension === 3 ? app.cross[axis] : 0;
     if (this.slider) this.slider.value = String(at);
     const overlay = app.overlay;
-    const wanted = `${app.imageNumber} ${app.revision} ${at} ${overlay} ${app.wantsDistance}`;
+    const wanted = `${app.imageNumber} ${app.state?.shown} ${at} ${overlay} ${app.wantsDistance}`;
     if (wanted === this.wanted) return;
     this.wanted = wanted;
     const get = async (path) => {

@@ -54,6 +54,8 @@ struct Engine {
     attention: Attention,
     /// Counts everything that pages could see change.
     revision: u32,
+    /// Counts exhibits.
+    shown: u32,
     /// The revision of the atoms that pages show.
     atoms_revision: u32,
     /// Whether pages show atoms.
@@ -92,6 +94,7 @@ impl Engine {
             attention: Attention::new(requests, hub.clone()),
             hub,
             revision: 0,
+            shown: 0,
             atoms_revision: 0,
             shows_atoms: false,
             drag: None,
@@ -330,7 +333,8 @@ impl Engine {
         Ok(())
     }
 
-    fn exhibit(&self) {
+    fn exhibit(&mut self) {
+        self.shown += 1;
         let shown: Option<Arc<dyn Exhibit>> = self.session.model().and_then(|model| match model {
             AnyModel::Flat(model) => shown(model, self.revision),
             AnyModel::Volume(model) => shown(model, self.revision),
@@ -341,6 +345,7 @@ impl Engine {
     fn publish_state(&self) {
         let told = state::Told {
             revision: self.revision,
+            shown: self.shown,
             atoms_revision: self.atoms_revision,
             is_busy: self.has_work(),
             has_atoms: self.made.atoms,

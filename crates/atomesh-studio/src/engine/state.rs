@@ -22,6 +22,7 @@ const LOOKED_AT: usize = 1 << 18;
 /// What the engine knows beside the session.
 pub struct Told<'a> {
     pub revision: u32,
+    pub shown: u32,
     pub atoms_revision: u32,
     pub is_busy: bool,
     pub has_atoms: bool,
@@ -35,6 +36,7 @@ pub fn state(session: &Session, told: &Told<'_>) -> Value {
     let [undo, redo] = session.counts();
     json!({
         "revision": told.revision,
+        "shown": told.shown,
         "atomsRevision": told.atoms_revision,
         "hasAtoms": told.has_atoms,
         "busy": told.is_busy,

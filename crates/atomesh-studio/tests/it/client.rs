@@ -27,7 +27,8 @@ pub struct Studio {
     pub addresses: Vec<std::net::SocketAddr>,
     is_ended: Arc<AtomicBool>,
     thread: Option<JoinHandle<std::io::Result<()>>>,
-    _kept: Option<tempfile::TempDir>,
+    /// The folder, if it is the test's alone.
+    kept: Option<tempfile::TempDir>,
 }
 
 impl Studio {
@@ -39,14 +40,18 @@ impl Studio {
         let mut run = RunConfig::parse(options).unwrap();
         run.input.image = Some(path.into());
         session.open_file(run, &mut Silent).unwrap();
-        Self { _kept: Some(kept), ..Self::serve(session, Duration::from_secs(600)) }
+        let mut studio = Self::serve(session, Duration::from_secs(600));
+        studio.kept = Some(kept);
+        studio
     }
 
     /// A session on nothing.
     pub fn empty() -> Self {
         let kept = tempfile::tempdir().unwrap();
         let session = Session::open(&kept.path().join("session"), &mut Silent).unwrap();
-        Self { _kept: Some(kept), ..Self::serve(session, Duration::from_secs(600)) }
+        let mut studio = Self::serve(session, Duration::from_secs(600));
+        studio.kept = Some(kept);
+        studio
     }
 
     /// Serves a session.
@@ -58,7 +63,7 @@ impl Studio {
         let is_ended = Arc::new(AtomicBool::new(false));
         let ended = is_ended.clone();
         let thread = std::thread::spawn(move || server.run(|| ended.load(Ordering::SeqCst)));
-        Self { folder, address, port, addresses, is_ended, thread: Some(thread), _kept: None }
+        Self { folder, address, port, addresses, is_ended, thread: Some(thread), kept: None }
     }
 
     /// Whether the server has ended by itself.
@@ -85,7 +90,13 @@ impl Studio {
     }
 
     /// A request of a method, with headers beside `Host` and `Connection`.
-    pub fn request(&self, method: &str, path: &str, headers: &[(&str, &str)], body: &str) -> Answer {
+    pub fn request(
+        &self,
+        method: &str,
+        path: &str,
+        headers: &[(&str, &str)],
+        body: &str,
+    ) -> Answer {
         let mut text = format!("{method} {path} HTTP/1.1\r\nConnection: close\r\n");
         if !headers.iter().any(|(name, _)| name.eq_ignore_ascii_case("host")) {
             text += &format!("Host: {}\r\n", self.host());
@@ -107,6 +118,11 @@ impl Studio {
 
     /// A page, as far as the protocol goes.
     pub fn page(&self, cookie: &str) -> Page {
+        self.try_page(cookie).expect("the page is let in")
+    }
+
+    /// The same; `None` if it is not let in.
+    pub fn try_page(&self, cookie: &str) -> Option<Page> {
         let mut request = format!("ws://{}/socket", self.host()).into_client_request().unwrap();
         let headers = request.headers_mut();
         headers.insert("cookie", HeaderValue::from_str(cookie).unwrap());
@@ -114,8 +130,8 @@ impl Studio {
         headers.insert("origin", HeaderValue::from_str(&origin).unwrap());
         let stream = TcpStream::connect((Ipv4Addr::LOCALHOST, self.port)).unwrap();
         stream.set_read_timeout(Some(TIME)).unwrap();
-        let (socket, _) = tungstenite::client(request, stream).expect("the page is let in");
-        Page { socket, seq: 0, state: Value::Null, frames: Vec::new(), acknowledges: true }
+        let (socket, _) = tungstenite::client(request, stream).ok()?;
+        Some(Page { socket, seq: 0, state: Value::Null, frames: Vec::new(), acknowledges: true })
     }
 
     pub fn stop(&mut self) {
@@ -197,9 +213,16 @@ impl Page {
         answer
     }
 
+    /// Asks for what changes the state, and waits until it has.
+    pub fn change(&mut self, command: Value) {
+        let before = self.state["revision"].clone();
+        self.must(command);
+        self.until(|state| state["revision"] != before);
+    }
+
     /// Does a gesture.
     pub fn act(&mut self, gesture: Value) {
-        self.must(json!({ "op": "do", "gesture": gesture }));
+        self.change(json!({ "op": "do", "gesture": gesture }));
     }
 
     fn send(&mut self, command: &Value, seq: u32) {
@@ -248,7 +271,9 @@ impl Page {
 
     /// Waits until all is made.
     pub fn settle(&mut self) {
-        self.until(|state| state["busy"] == false && (state["hash"].is_string() || !state["error"].is_null()));
+        self.until(|state| {
+            state["busy"] == false && (state["hash"].is_string() || !state["error"].is_null())
+        });
     }
 
     /// The hash of the mesh, once all is made.

@@ -37,14 +37,6 @@ fn middle_atom(page: &Page) -> (u32, [f64; 2]) {
     (nearest as u32, place(nearest))
 }
 
-fn drag(page: &mut Page, atom: u32, path: &[[f64; 2]]) {
-    let revision = page.state["atomsRevision"].clone();
-    for to in path {
-        page.must(json!({ "op": "drag", "atom": atom, "to": to, "reach": 5.0, "revision": revision }));
-    }
-    page.must(json!({ "op": "drop" }));
-}
-
 /// The words of a command line without quotes.
 fn words(line: &str) -> Vec<String> {
     line.split(' ').map(|word| word.trim_matches('\'').to_owned()).collect()
@@ -64,7 +56,8 @@ fn exported(studio: &Studio, cookie: &str, format: &str) -> Vec<u8> {
 fn run_of(line: &str, output: &Path) -> RunConfig {
     let words = words(line);
     assert_eq!(words[..2], ["atomesh", "mesh"]);
-    let matches = RunConfig::augment_args(clap::Command::new("mesh")).try_get_matches_from(&words[1..]);
+    let matches =
+        RunConfig::augment_args(clap::Command::new("mesh")).try_get_matches_from(&words[1..]);
     let mut run = RunConfig::from_arg_matches(&matches.unwrap()).unwrap();
     run.output.output = Some(output.into());
     run
@@ -92,7 +85,8 @@ fn an_export_is_what_the_copied_command_writes() {
         last = hash;
         for format in ["vtu", "inp"] {
             let bytes = exported(&studio, &cookie, format);
-            let line = page.must(json!({ "op": "command-line" }))["text"].as_str().unwrap().to_owned();
+            let line =
+                page.must(json!({ "op": "command-line" }))["text"].as_str().unwrap().to_owned();
             let output = folder.path().join(format!("command.{format}"));
             let run = run_of(&line, &output);
             let mut watch = Silent;
@@ -163,12 +157,12 @@ fn an_atom_is_dragged_and_those_beyond_reach_stay() {
         // the reach of 5 edges, and the step that its middle was moved
         assert!((x - to[0]).hypot(y - to[1]) < 15.0 + 0.1, "atom {} at {x},{y}", moved[i]);
     }
-    page.must(json!({ "op": "drop" }));
+    page.change(json!({ "op": "drop" }));
     assert_ne!(page.hash(), before);
     page.until(|state| state["hasAtoms"] == true);
-    page.must(json!({ "op": "undo" }));
+    page.change(json!({ "op": "undo" }));
     assert_eq!(page.hash(), before);
-    page.must(json!({ "op": "redo" }));
+    page.change(json!({ "op": "redo" }));
     assert_ne!(page.hash(), before);
 }
 
@@ -191,8 +185,14 @@ fn refused_edits_say_why_and_change_nothing() {
         (json!({ "do": "move", "atom": atom, "path": [[1.0, 2.0]], "reach": 5.0 }), "pinned"),
         (json!({ "do": "move", "atom": 1, "path": [[1.0, 2.0]], "reach": 5000.0 }), "reach"),
         (json!({ "do": "move", "atom": 1, "path": [[1.0, 2.0, 3.0]], "reach": 5.0 }), "3 numbers"),
-        (json!({ "do": "paint", "field": "weight", "value": 2.0, "radius": 5.0, "path": [[1.0, 2.0]] }), "0 to 1"),
-        (json!({ "do": "paint", "field": "size", "value": 2.0, "radius": 0.0, "path": [[1.0, 2.0]] }), "radius"),
+        (
+            json!({ "do": "paint", "field": "weight", "value": 2.0, "radius": 5.0, "path": [[1.0, 2.0]] }),
+            "0 to 1",
+        ),
+        (
+            json!({ "do": "paint", "field": "size", "value": 2.0, "radius": 0.0, "path": [[1.0, 2.0]] }),
+            "radius",
+        ),
         (json!({ "do": "set", "option": "lattice.size", "value": "cat" }), "lattice.size"),
         (json!({ "do": "set", "option": "lattice.lattice", "value": "bcc" }), "axes"),
         (json!({ "do": "remove-well", "well": 0 }), "no well"),
@@ -250,7 +250,7 @@ fn a_thousand_gestures_are_undone_and_redone_to_the_same_mesh() {
         }
     }
     assert_eq!(done, 1000);
-    let mut export = |session: &mut Session, name: &str| {
+    let export = |session: &mut Session, name: &str| {
         let path = folder.path().join(name);
         session.write(&path, &mut Silent).unwrap();
         std::fs::read(path).unwrap()
@@ -289,7 +289,9 @@ fn a_stalled_page_keeps_memory_flat_and_gets_the_newest() {
     stalled.acknowledges = false;
     page.settle();
     for i in 0..20 {
-        page.act(json!({ "do": "set", "option": "lattice.beta", "value": 0.3 + 0.01 * f64::from(i) }));
+        page.act(
+            json!({ "do": "set", "option": "lattice.beta", "value": 0.3 + 0.01 * f64::from(i) }),
+        );
     }
     let hash = page.hash();
     // it was sent one frame of each kind, and no second before it says that it has the first
@@ -312,10 +314,14 @@ fn facets_are_closed_and_opened_and_flow_follows() {
     page.settle();
     page.act(json!({ "do": "well", "kind": "source", "at": [10.0, 10.0] }));
     page.act(json!({ "do": "well", "kind": "sink", "at": [10.0, 40.0] }));
-    let flows = |state: &Value| state["model"]["flow"]["lines"].as_u64().is_some_and(|lines| lines > 5);
+    let flows =
+        |state: &Value| state["model"]["flow"]["lines"].as_u64().is_some_and(|lines| lines > 5);
     page.until(|state| state["busy"] == false && flows(state));
     let rates = page.state["model"]["flow"]["rates"].clone();
-    assert!((rates[0].as_f64().unwrap() - 1.0).abs() < 1e-9 && rates[1].as_f64().unwrap() < 0.0, "{rates}");
+    assert!(
+        (rates[0].as_f64().unwrap() - 1.0).abs() < 1e-9 && rates[1].as_f64().unwrap() < 0.0,
+        "{rates}"
+    );
     assert!(page.state["model"]["flow"]["imbalance"].as_f64().unwrap() < 1e-9);
     let closed = |page: &Page| {
         let frame = page.frame(4);
@@ -327,7 +333,7 @@ fn facets_are_closed_and_opened_and_flow_follows() {
     page.act(json!({ "do": "facet", "at": [20.0, 20.0], "whole": true, "multiplier": 1.0 }));
     page.until(|state| state["busy"] == false && flows(state));
     assert!(closed(&page) < before);
-    page.must(json!({ "op": "undo" }));
+    page.change(json!({ "op": "undo" }));
     page.until(|state| state["busy"] == false && flows(state));
     assert_eq!(closed(&page), before);
     page.act(json!({ "do": "facet", "at": [55.0, 40.0], "whole": false, "multiplier": 0.0 }));
@@ -342,8 +348,8 @@ fn a_volume_is_shown_by_slices_of_its_cells() {
     let studio = Studio::empty();
     let cookie = studio.cookie();
     let mut page = studio.page(&cookie);
-    page.must(json!({ "op": "scene", "name": "sphere", "seed": 0 }));
-    page.must(json!({ "op": "do", "gesture": { "do": "set", "option": "lattice.size", "value": 16.0 } }));
+    page.change(json!({ "op": "scene", "name": "sphere", "seed": 0 }));
+    page.act(json!({ "do": "set", "option": "lattice.size", "value": 16.0 }));
     page.settle();
     assert_eq!(page.state["model"]["dimension"], 3);
     let get = |path: &str| studio.request("GET", path, &[("Cookie", &cookie)], "");
