@@ -110,7 +110,7 @@ export class Atoms {
   }
 
   move(view, event) {
-    this.over = { view, at: view.toSamples(event.offsetX, event.offsetY), x: event.offsetX, y: event.offsetY };
+    this.over = { view, at: view.toSamples(event.offsetX, event.offsetY) };
     if (this.atom !== null && this.atom !== undefined && !this.isFailed) {
       this.pending = this.over.at;
       this.step();
@@ -153,7 +153,7 @@ export class Atoms {
 
   under() {
     if (!this.over) return null;
-    const atom = this.nearest(this.over.view, this.over.x, this.over.y);
+    const atom = this.nearest(this.over.view, ...this.over.view.toPixels(this.over.at));
     if (atom === null) this.app.say("There is no atom under the pointer.");
     return atom;
   }

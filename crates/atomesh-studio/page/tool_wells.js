@@ -36,7 +36,7 @@ export class Wells {
   }
 
   move(view, event) {
-    this.over = { view, at: view.toSamples(event.offsetX, event.offsetY), x: event.offsetX, y: event.offsetY };
+    this.over = { view, at: view.toSamples(event.offsetX, event.offsetY) };
     this.app.redraw();
   }
 
@@ -52,7 +52,7 @@ export class Wells {
   }
 
   remove() {
-    const well = this.over ? this.nearest(this.over.view, this.over.x, this.over.y) : null;
+    const well = this.over ? this.nearest(this.over.view, ...this.over.view.toPixels(this.over.at)) : null;
     if (well === null) this.app.say("There is no well under the pointer.");
     else this.app.do({ do: "remove-well", well });
   }

@@ -26,7 +26,7 @@ export class View {
     this.box.append(this.canvas, this.label);
     parent.append(this.box);
     this.drawing = new Drawing(this.canvas);
-    this.at = 0;
+    this.isWhole = true;
     this.center = [0, 0];
     this.zoom = 1;
     /** @type {any} */
@@ -36,7 +36,7 @@ export class View {
     this.slices = {};
     if (app.dimension === 3) this.addSlider();
     new ResizeObserver(() => {
-      if (!this.isPlaced) this.reset();
+      if (this.isWhole) this.reset();
       app.redraw();
     }).observe(this.canvas);
   }
@@ -78,7 +78,7 @@ export class View {
     const [sx, sy] = this.steps;
     this.center = [(nx - 1) / 2, (ny - 1) / 2];
     this.zoom = 0.95 * Math.min(clientWidth / (nx * sx), clientHeight / (ny * sy));
-    this.isPlaced = clientWidth > 0;
+    this.isWhole = true;
   }
 
   /** Pixels of a sample's step along the two axes, in CSS pixels. */
@@ -123,6 +123,7 @@ export class View {
   }
 
   zoomAt(x, y, factor) {
+    this.isWhole = false;
     const before = this.toSamples(x, y);
     this.zoom = Math.min(400, Math.max(0.02, this.zoom * factor));
     const after = this.toSamples(x, y);
@@ -131,6 +132,7 @@ export class View {
   }
 
   pan(dx, dy) {
+    this.isWhole = false;
     const [px, py] = this.pixels;
     this.center = [this.center[0] - dx / px, this.center[1] - ((this.isUp ? -1 : 1) * dy) / py];
     this.app.redraw();

@@ -1,4 +1,4 @@
-//! Facets that hinder flow, wells, and what flows between them (Hale & Emanuel 2004).
+//! Facets that hinder flow, wells, and what flows between them.
 //!
 //! Barriers and wells are kept by their places, so that they outlive a mesh. The facets of all features are barriers that
 //! let nothing through; a gesture gives the nearest facet, or the feature that it is a part of, another multiplier.

@@ -44,14 +44,16 @@ impl<const D: usize> Model<D> {
         Ok(())
     }
 
-    /// The options as the job takes them: what is painted is not given as a number.
+    /// The options as the job takes them: what is painted is not given as a number, but as a file would be.
     pub(super) fn job_run(&self) -> RunConfig {
         let mut run = self.run.clone();
         if self.size_paint.is_some() {
+            run.input.size_field = Some(SIZE_FILE.into());
             (run.lattice.size, run.lattice.frequency) = (None, None);
             run.lattice.points_per_wavelength = None;
         }
         if self.weight_paint.is_some() {
+            run.input.beta_field = Some(WEIGHT_FILE.into());
             run.lattice.beta = None;
         }
         run

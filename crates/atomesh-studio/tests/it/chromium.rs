@@ -141,7 +141,11 @@ impl Tab {
     pub fn until(&mut self, expression: &str) {
         let started = Instant::now();
         while self.value(&format!("Boolean({expression})")) != true {
-            assert!(started.elapsed() < TIME, "never: {expression}");
+            if started.elapsed() > TIME {
+                let told = "[document.getElementById('message')?.textContent, window.studio?.state?.error, \
+                            window.studio?.state?.busy, window.studio?.state?.revision]";
+                panic!("never: {expression}; the page says {}", self.value(told));
+            }
             std::thread::sleep(Duration::from_millis(30));
         }
     }

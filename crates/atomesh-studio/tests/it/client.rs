@@ -282,9 +282,26 @@ impl Page {
         self.state["hash"].as_str().unwrap_or_else(|| panic!("{:#}", self.state)).to_owned()
     }
 
-    /// The newest frame of a kind.
-    pub fn frame(&self, kind: u8) -> &[u8] {
-        self.frames.iter().rev().find(|frame| frame[0] == kind).expect("there is a frame")
+    /// The frame of a kind at a revision or after, which may come after the state that tells of it.
+    pub fn frame(&mut self, kind: u8, revision: u64) -> Vec<u8> {
+        let started = Instant::now();
+        let is_wanted = |frame: &&Vec<u8>| {
+            let own = u32::from_le_bytes(frame[4..8].try_into().unwrap());
+            frame[0] == kind && u64::from(own) >= revision
+        };
+        loop {
+            if let Some(frame) = self.frames.iter().rev().find(is_wanted) {
+                return frame.clone();
+            }
+            assert!(started.elapsed() < TIME, "no frame {kind} of revision {revision}");
+            assert_eq!(self.take(), None);
+        }
+    }
+
+    /// The atoms that are shown.
+    pub fn atoms(&mut self) -> Vec<u8> {
+        let revision = self.state["atomsRevision"].as_u64().unwrap();
+        self.frame(2, revision)
     }
 }
 

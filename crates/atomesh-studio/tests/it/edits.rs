@@ -6,6 +6,7 @@ use atomesh::watch::Silent;
 use atomesh_job::mesh::{MeshFileOptions, mesh_file};
 use atomesh_job::options::RunConfig;
 use atomesh_studio::Session;
+use atomesh_studio::protocol::{Command, Numbered};
 use atomesh_studio::replay::replay;
 use clap::{Args, FromArgMatches};
 use serde_json::{Value, json};
@@ -25,9 +26,9 @@ fn show_atoms(page: &mut Page) {
 }
 
 /// An atom about the middle of the image, and its place in samples.
-fn middle_atom(page: &Page) -> (u32, [f64; 2]) {
-    let frame = page.frame(2);
-    let count = u32_at(frame, 8) as usize;
+fn middle_atom(page: &mut Page) -> (u32, [f64; 2]) {
+    let frame = page.atoms();
+    let count = u32_at(&frame, 8) as usize;
     let place = |i: usize| -> [f64; 2] {
         let at = |k| f64::from(u16::from_le_bytes([frame[k], frame[k + 1]])) / 65535.0;
         [at(16 + 8 * i) * 63.0, at(18 + 8 * i) * 47.0]
@@ -138,18 +139,15 @@ fn an_atom_is_dragged_and_those_beyond_reach_stay() {
     let mut page = studio.page(&cookie);
     show_atoms(&mut page);
     let before = page.hash();
-    let (atom, from) = middle_atom(&page);
+    let (atom, from) = middle_atom(&mut page);
     let to = [from[0] + 2.0, from[1] + 1.5];
     let revision = page.state["atomsRevision"].clone();
     page.must(json!({ "op": "drag", "atom": atom, "to": to, "reach": 5.0, "revision": revision }));
-    while !page.frames.iter().any(|frame| frame[0] == 3) {
-        page.take();
-    }
-    let frame = page.frame(3).to_vec();
+    let frame = page.frame(3, revision.as_u64().unwrap());
     let moves = u32_at(&frame, 8) as usize;
     let moved: Vec<u32> = (0..moves).map(|i| u32_at(&frame, 16 + 8 * i)).collect();
     assert!(moved.contains(&atom) && moves > 3, "{moves} follow");
-    let atoms = page.frame(2).to_vec();
+    let atoms = page.atoms();
     for i in 0..moves {
         let old = 16 + 8 * moved[i] as usize;
         let x = f64::from(u16::from_le_bytes([atoms[old], atoms[old + 1]])) / 65535.0 * 63.0;
@@ -173,7 +171,7 @@ fn refused_edits_say_why_and_change_nothing() {
     let cookie = studio.cookie();
     let mut page = studio.page(&cookie);
     show_atoms(&mut page);
-    let (atom, place) = middle_atom(&page);
+    let (atom, place) = middle_atom(&mut page);
     page.act(json!({ "do": "pin", "atom": atom, "pinned": true }));
     show_atoms(&mut page);
     let hash = page.hash();
@@ -323,22 +321,23 @@ fn facets_are_closed_and_opened_and_flow_follows() {
         "{rates}"
     );
     assert!(page.state["model"]["flow"]["imbalance"].as_f64().unwrap() < 1e-9);
-    let closed = |page: &Page| {
-        let frame = page.frame(4);
-        let count = u32_at(frame, 8) as usize;
-        (0..count).filter(|i| u32_at(frame, 24 + 12 * i) < 1 << 16).count()
+    let closed = |page: &mut Page| {
+        let revision = page.state["revision"].as_u64().unwrap();
+        let frame = page.frame(4, revision);
+        let count = u32_at(&frame, 8) as usize;
+        (0..count).filter(|i| u32_at(&frame, 24 + 12 * i) < 1 << 16).count()
     };
-    let before = closed(&page);
+    let before = closed(&mut page);
     assert!(before > 3, "the facets of features are barriers: {before}");
     page.act(json!({ "do": "facet", "at": [20.0, 20.0], "whole": true, "multiplier": 1.0 }));
     page.until(|state| state["busy"] == false && flows(state));
-    assert!(closed(&page) < before);
+    assert!(closed(&mut page) < before);
     page.change(json!({ "op": "undo" }));
     page.until(|state| state["busy"] == false && flows(state));
-    assert_eq!(closed(&page), before);
+    assert_eq!(closed(&mut page), before);
     page.act(json!({ "do": "facet", "at": [55.0, 40.0], "whole": false, "multiplier": 0.0 }));
     page.until(|state| state["busy"] == false && flows(state));
-    assert_eq!(closed(&page), before + 1);
+    assert_eq!(closed(&mut page), before + 1);
     page.act(json!({ "do": "remove-well", "well": 1 }));
     page.until(|state| state["busy"] == false && state["model"]["flow"]["lines"] == 0);
 }
@@ -366,4 +365,68 @@ fn a_volume_is_shown_by_slices_of_its_cells() {
     }
     let mesh = exported(&studio, &cookie, "vtu");
     assert!(mesh.len() > 10_000);
+}
+
+#[test]
+fn mangled_commands_are_refused_or_done_and_never_end_the_studio() {
+    let folder = tempfile::tempdir().unwrap();
+    let path = folder.path().join("session");
+    let mut session = Session::open(&path, &mut Silent).unwrap();
+    let mut run = RunConfig::parse("[lattice]\nsize = 12.0").unwrap();
+    run.input.image = Some(image_file(folder.path()));
+    session.open_file(run, &mut Silent).unwrap();
+    let mut seed = 7_u64;
+    let mut random = move |below: usize| {
+        seed = seed.wrapping_mul(6364136223846793005).wrapping_add(1442695040888963407);
+        (seed >> 33) as usize % below
+    };
+    let parts = [
+        "0",
+        "-1",
+        "1e999",
+        "1e300",
+        "-1e-300",
+        "null",
+        "4294967295",
+        "\"\"",
+        "[]",
+        "[[]]",
+        "[[1,2]]",
+        "[1,2]",
+        "[1,2,3]",
+        "true",
+        "\"size\"",
+        "\"weight\"",
+        "\"move\"",
+        "\"add\"",
+        "{",
+        "}",
+        ",",
+        "\u{0}",
+    ];
+    let (mut read, mut done) = (0, 0);
+    for gesture in gestures(3000, 40) {
+        let mut text =
+            json!({ "seq": 1, "command": { "op": "do", "gesture": gesture } }).to_string();
+        for _ in 0..random(3) {
+            let (from, part) = (random(text.len()), parts[random(parts.len())]);
+            let to = (from + random(6)).min(text.len());
+            if text.is_char_boundary(from) && text.is_char_boundary(to) {
+                text.replace_range(from..to, part);
+            }
+        }
+        let Ok(numbered) = Numbered::parse(&text) else { continue };
+        read += 1;
+        let Command::Do { gesture } = numbered.command else { continue };
+        let before = session.counts();
+        match session.act(gesture, &mut Silent) {
+            Ok(()) => {
+                done += 1;
+                session.undo(&mut Silent).unwrap();
+                assert_eq!(session.counts()[0], before[0], "{text}");
+            }
+            Err(_) => assert_eq!(session.counts(), before, "{text}"),
+        }
+    }
+    assert!(read > 1000 && read < 3000 && done > 300, "{read} read, {done} done");
 }
