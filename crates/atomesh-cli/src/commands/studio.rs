@@ -67,6 +67,10 @@ pub fn run(args: StudioArgs, progress: &mut Progress) -> Result<String, JobError
     if run.input.image.is_none() && run.input.potential.is_none() && run.input.labels.is_some() {
         run.follow_labels();
     }
+    if let Some(path) = run.input.shown() {
+        // before a folder is made for it
+        std::fs::metadata(path).map_err(|e| JobError::unreadable(&e).about(path))?;
+    }
     let folder = args.session.unwrap_or_else(|| default_folder(run.input.shown()));
     let mut session = Session::open(&folder, progress)?;
     match session.source() {

@@ -544,3 +544,56 @@ fn facets_are_clicked() {
     tab.until(&format!("{closed} < {} && !studio.state.busy", before - 1));
     assert!(tab.picture().count(low, high, is_red) < red);
 }
+
+/// Chooses an option of a list, as a hand would.
+fn select(tab: &mut Tab, id: &str, value: &str) {
+    tab.value(&format!(
+        "(() => {{ const s = document.getElementById('{id}'); s.value = '{value}'; \
+         s.dispatchEvent(new Event('change')); }})()"
+    ));
+}
+
+#[test]
+fn a_newcomer_follows_edges_paints_and_exports() {
+    let Some(data) = std::env::var_os("ATOMESH_DATA") else {
+        eprintln!("not tested on a real image: ATOMESH_DATA is not set");
+        return;
+    };
+    let Some(mut tab) = Tab::open() else { return };
+    let studio = Studio::on_file(&Path::new(&data).join("hale2001-fig11-torso.png"), "");
+    tab.go(&studio.address);
+    tab.settle();
+    tab.keep_picture("torso-1.png");
+    let before = tab.value("studio.state.hash");
+    select(&mut tab, "kind", "edges");
+    tab.until(&format!(
+        "!studio.state.busy && studio.state.hash && studio.state.hash !== {before}"
+    ));
+    tab.key("b", 0);
+    tab.until("studio.views[0].slices.potential");
+    tab.keep_picture("torso-2.png");
+    tab.key("b", 0);
+    tab.key("2", 0);
+    let shape: Vec<f64> = serde_json::from_value(tab.value("studio.shape")).unwrap();
+    for (x, y) in [(0.3, 0.45), (0.7, 0.45)] {
+        let undo = tab.value("studio.state.undo").as_u64().unwrap();
+        let path = [(x - 0.05, y), (x, y + 0.05), (x + 0.05, y)];
+        let path = path.map(|(x, y)| tab.place(0, [x * shape[0], y * shape[1]]));
+        tab.drag(&path, "left", 0);
+        tab.until(&format!(
+            "studio.state.undo === {} && !studio.state.busy && studio.state.figures",
+            undo + 1
+        ));
+    }
+    tab.keep_picture("torso-3.png");
+    select(&mut tab, "format", "inp");
+    tab.value("document.getElementById('export').click()");
+    tab.until("document.getElementById('message').textContent.startsWith('Written as mesh.inp')");
+    let written = std::fs::read_to_string(studio.folder.join("mesh.inp")).unwrap();
+    assert!(written.contains("*NODE") && written.contains("*ELEMENT"), "{}", &written[..200]);
+    tab.value("document.getElementById('copy').click()");
+    tab.until("!document.getElementById('command').hidden");
+    tab.value("document.getElementById('command').scrollIntoView()");
+    tab.keep_picture("torso-4.png");
+    assert_eq!(tab.complaints(), Vec::<String>::new());
+}
