@@ -10,6 +10,7 @@ import { Facets } from "./tool_facets.js";
 import { Look } from "./tool_look.js";
 import { Paint } from "./tool_paint.js";
 import { Wells } from "./tool_wells.js";
+import { Space } from "./space.js";
 import { View } from "./view.js";
 
 const TOOLS = ["look", "size", "weight", "atoms", "regions", "facets", "wells"];
@@ -113,10 +114,12 @@ class App {
     this.imageNumber += 1;
     this.frames = { mesh: this.frames.mesh && this.frames.mesh.revision >= this.revision ? this.frames.mesh : null };
     for (const view of this.views) view.remove();
+    this.space?.remove();
     const parent = document.getElementById("views");
     parent.className = this.dimension === 3 ? "three" : "";
     this.cross = this.shape.map((n) => Math.floor(n / 2));
     this.views = (this.dimension === 3 ? [2, 1, 0] : [2]).map((axis) => new View(this, parent, axis));
+    this.space = this.dimension === 3 ? new Space(this, parent) : null;
     if (this.dimension === 3 && (this.tool.showsAtoms || this.tool === this.tools[6] || this.tool === this.tools[7])) this.choose(1);
     this.autoContrast();
     this.markTool();
@@ -160,6 +163,7 @@ class App {
     document.body.dataset.busy = String(busy);
     document.body.dataset.hash = state?.hash ?? "";
     for (const view of this.views) view.load();
+    this.space?.load();
     this.redraw();
   }
 
@@ -169,6 +173,7 @@ class App {
     requestAnimationFrame(() => {
       this.isDrawing = false;
       for (const view of this.views) view.draw();
+      this.space?.draw();
     });
   }
 
@@ -220,6 +225,7 @@ class App {
 
   resetViews() {
     for (const view of this.views) view.reset();
+    this.space?.reset();
     this.redraw();
   }
 

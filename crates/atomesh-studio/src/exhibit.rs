@@ -8,12 +8,13 @@ use std::sync::Arc;
 
 use atomesh::geometry::Point;
 use atomesh::image::Grid;
+use atomesh::mesh::is_feature_name;
 use atomesh::run::{Outcome, Prepared};
 
 use atomesh_job::mesh::MeshImages;
 
 use crate::model::Playback;
-use crate::protocol::{Arrays, Kind};
+use crate::protocol::{Arrays, Kind, share};
 use crate::slice_cells::slice_cells;
 
 /// Samples of the longest side of a slice: what textures of all browsers hold.
@@ -40,6 +41,10 @@ pub trait Exhibit: fmt::Debug + Send + Sync {
 
     /// The edges in which a plane through a sample cuts the cells, as a frame of [`Kind::Mesh`]; `None` in the plane.
     fn cells(&self, axis: usize, at: usize) -> Option<Vec<u8>>;
+
+    /// The surfaces of features in space: a u32, how many triangles, and for each of them three places as u16 and the number of
+    /// its feature, from 1; `None` if there are none.
+    fn surface(&self) -> Option<Vec<u8>>;
 
     /// The recorded iterations: four u32 (frames, atoms, axes, iterations from frame to frame), for each frame two f32, the
     /// pairs' and the image's energy, then for each frame the places of all atoms as u16.
@@ -104,6 +109,29 @@ impl<const D: usize> Exhibit for Shown<D> {
         Some(arrays.into_bytes())
     }
 
+    fn surface(&self) -> Option<Vec<u8>> {
+        let outcome =
+            self.outcome.as_ref().filter(|outcome| D == 3 && outcome.cells().is_none())?;
+        let tags = outcome.tags().ok()?;
+        let groups = tags.facet_groups().iter().filter(|group| is_feature_name(&group.name));
+        let facets: Vec<(u16, [u32; D])> = (groups.zip(1_u16..))
+            .flat_map(|(group, number)| group.facets.iter().map(move |facet| (number, *facet)))
+            .collect();
+        if facets.is_empty() {
+            return None;
+        }
+        let points = outcome.mesh().points();
+        let mut bytes = (facets.len() as u32).to_le_bytes().to_vec();
+        for (number, facet) in facets {
+            for corner in facet {
+                let place = shares(&points[corner as usize], &self.grid);
+                bytes.extend(place.iter().flat_map(|share| share.to_le_bytes()));
+            }
+            bytes.extend(number.to_le_bytes());
+        }
+        Some(bytes)
+    }
+
     fn playback(&self) -> Option<Vec<u8>> {
         let playback = self.playback.as_ref()?;
         let count = playback.frames.first()?.len() / D;
@@ -111,19 +139,17 @@ impl<const D: usize> Exhibit for Shown<D> {
         let mut bytes: Vec<u8> = head.iter().flat_map(|n| (*n as u32).to_le_bytes()).collect();
         let energies = playback.energies.iter().flatten();
         bytes.extend(energies.flat_map(|energy| (*energy as f32).to_le_bytes()));
-        let extent: Point<D> =
-            std::array::from_fn(|k| (self.grid.shape[k] as f64 - 1.0) * self.grid.step[k]);
-        for frame in &playback.frames {
-            for place in frame.chunks_exact(D) {
-                for k in 0..D {
-                    let share =
-                        (f64::from(place[k]) / extent[k].max(f64::MIN_POSITIVE)).clamp(0.0, 1.0);
-                    bytes.extend(((share * 65535.0).round() as u16).to_le_bytes());
-                }
-            }
+        for place in playback.frames.iter().flat_map(|frame| frame.chunks_exact(D)) {
+            let place = shares(&std::array::from_fn(|k| f64::from(place[k])), &self.grid);
+            bytes.extend(place.iter().flat_map(|share| share.to_le_bytes()));
         }
         Some(bytes)
     }
+}
+
+/// A place as shares of the box, 0…65535.
+fn shares<const D: usize>(p: &Point<D>, grid: &Grid<D>) -> [u16; D] {
+    std::array::from_fn(|k| share(p[k], grid, k))
 }
 
 /// A slice with its head; every so manyth sample of a side longer than [`LONGEST`].

@@ -29,6 +29,7 @@ pub const ASSETS: &[Asset] = assets! {
     "keys.js": "text/javascript; charset=utf-8",
     "view.js": "text/javascript; charset=utf-8",
     "draw.js": "text/javascript; charset=utf-8",
+    "space.js": "text/javascript; charset=utf-8",
     "panel.js": "text/javascript; charset=utf-8",
     "playback.js": "text/javascript; charset=utf-8",
     "tool_look.js": "text/javascript; charset=utf-8",

@@ -166,17 +166,20 @@ impl Arrays {
 
     /// Adds a place, of which some axes are seen.
     pub fn place<const D: usize>(&mut self, p: &Point<D>, grid: &Grid<D>, axes: [usize; 2]) {
-        for k in axes {
-            let extent = (grid.shape[k] as f64 - 1.0) * grid.step[k];
-            let share = if extent > 0.0 { (p[k] / extent).clamp(0.0, 1.0) } else { 0.0 };
-            self.0.extend(((share * 65535.0).round() as u16).to_le_bytes());
-        }
+        self.0.extend(axes.into_iter().flat_map(|k| share(p[k], grid, k).to_le_bytes()));
     }
 
     /// The frame.
     pub fn into_bytes(self) -> Vec<u8> {
         self.0
     }
+}
+
+/// A coordinate as a share of the box along an axis, 0…65535.
+pub fn share<const D: usize>(x: f64, grid: &Grid<D>, axis: usize) -> u16 {
+    let extent = (grid.shape[axis] as f64 - 1.0) * grid.step[axis];
+    let share = if extent > 0.0 { (x / extent).clamp(0.0, 1.0) } else { 0.0 };
+    (share * 65535.0).round() as u16
 }
 
 #[cfg(test)]

@@ -489,6 +489,24 @@ fn a_volume_is_three_linked_slices() {
         let (low, high) = ([low[0], low[1].min(high[1])], [high[0], low[1].max(high[1])]);
         assert!(picture.count(low, high, is_blue) > 300, "cells in view {view}");
     }
+    // the sphere's surface in space, in the colour of the first feature
+    tab.value("studio.do({ do: 'set', option: 'features.features', value: 'edges' })");
+    tab.until("studio.space.surface && studio.space.surface.count > 20 && !studio.state.busy");
+    tab.keep_picture("space.png");
+    let canvas = tab.value("(() => { const r = studio.space.canvas.getBoundingClientRect(); return [r.left, r.top, r.right, r.bottom]; })()");
+    let [left, top, right, bottom]: [f64; 4] = serde_json::from_value(canvas).unwrap();
+    let is_red = |[r, g, b]: [u8; 3]| {
+        r > 90 && u32::from(r) > u32::from(g) + 40 && u32::from(r) > u32::from(b) + 40
+    };
+    let red = |tab: &mut Tab| tab.picture().count([left, top], [right, bottom], is_red);
+    let before = red(&mut tab);
+    assert!(before > 1000, "{before} pixels of the surface");
+    let middle = [(left + right) / 2.0, (top + bottom) / 2.0];
+    tab.drag(&[middle, [middle[0] + 150.0, middle[1]]], "left", 0);
+    assert!(tab.value("studio.space.yaw").as_f64().unwrap() > 1.4);
+    assert!(red(&mut tab) > 1000, "a sphere is seen from everywhere");
+    tab.key("r", 0);
+    tab.until("Math.abs(studio.space.yaw - 0.6) < 1e-9");
     let cross: Value = tab.value("studio.cross");
     assert_eq!(cross, json!([48, 48, 48]));
     let at = tab.place(0, [20.0, 70.0]);
