@@ -26,7 +26,7 @@ const FRAGMENT = `#version 300 es
   void main() {
     if (isSlice) {
       float t = clamp((texture(values, tint.xy).r - range.x) / max(range.y - range.x, 1e-30), 0.0, 1.0);
-      color = vec4(vec3(0.08 + 0.92 * t), 1);
+      color = vec4(vec3(0.12 + 0.88 * t), 0.6);
       return;
     }
     vec3 normal = normalize(cross(dFdx(at), dFdy(at)));
@@ -73,6 +73,8 @@ export class Space {
     gl.linkProgram(program);
     gl.useProgram(program);
     gl.enable(gl.DEPTH_TEST);
+    gl.enable(gl.BLEND);
+    gl.blendFunc(gl.SRC_ALPHA, gl.ONE_MINUS_SRC_ALPHA);
     this.at = Object.fromEntries(["turn", "fit", "box", "range", "isSlice"].map((name) => [name, gl.getUniformLocation(program, name)]));
     this.buffers = [gl.createBuffer(), gl.createBuffer()];
   }
@@ -139,7 +141,7 @@ export class Space {
     if (!width || !height) return;
     if (canvas.width !== width || canvas.height !== height) [canvas.width, canvas.height] = [width, height];
     gl.viewport(0, 0, width, height);
-    gl.clearColor(0.067, 0.075, 0.09, 1);
+    gl.clearColor(0.227, 0.243, 0.282, 1);
     gl.clear(gl.COLOR_BUFFER_BIT | gl.DEPTH_BUFFER_BIT);
     const extent = app.shape.map((n, k) => Math.max(1, n - 1) * app.step[k]);
     const longest = Math.hypot(...extent);
@@ -147,11 +149,14 @@ export class Space {
     gl.uniform3fv(this.at.box, extent.map((x) => x / longest));
     gl.uniform2f(this.at.fit, (1.9 * this.zoom * least) / width, (1.9 * this.zoom * least) / height);
     gl.uniformMatrix3fv(this.at.turn, true, this.turn());
-    for (const view of app.views) this.drawSlice(view);
     if (this.surface) {
       gl.uniform1i(this.at.isSlice, 0);
       this.triangles(this.surface.places, this.surface.colors, gl.TRIANGLES, 3 * this.surface.count);
     }
+    // slices are seen through, so that they hide no surface
+    gl.depthMask(false);
+    for (const view of app.views) this.drawSlice(view);
+    gl.depthMask(true);
   }
 
   /** Rows: right, up, towards the eye. z points down on the screen, or up where it is a height. */

@@ -177,7 +177,7 @@ mod tests {
         for cut in 1..8 {
             std::fs::write(&path, &whole[..whole.len() - cut]).unwrap();
             let (mut log, entries) = Log::open(&path).unwrap();
-            assert_eq!(entries, [wipe.clone()], "{cut} bytes short");
+            assert_eq!(entries, std::slice::from_ref(&wipe), "{cut} bytes short");
             log.append(&Entry::Redo).unwrap();
             assert_eq!(Log::read_file(&path).unwrap(), [wipe.clone(), Entry::Redo]);
         }

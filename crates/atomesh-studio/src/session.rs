@@ -13,7 +13,7 @@ use atomesh_job::options::{InputOptions, RunConfig};
 
 use crate::gesture::Gesture;
 use crate::log::{Entry, Log, Source};
-use crate::model::{AnyModel, AnyOpened, Axes, Model, open, sha256};
+use crate::model::{AnyModel, AnyOpened, Axes, Model, each, open, sha256};
 
 /// The name of the log in the session's folder.
 pub const LOG_FILE: &str = "log.jsonl";
@@ -120,6 +120,12 @@ impl Session {
         self.model.as_mut()
     }
 
+    /// How many atoms there are to edit, removed ones too; 0 before any were asked for.
+    pub fn atom_count(&self) -> usize {
+        let model = self.model.as_ref();
+        model.map_or(0, |model| each!(model, m => m.edited().map_or(0, |e| e.atoms().len())))
+    }
+
     /// Writes the mesh.
     ///
     /// # Errors
@@ -186,6 +192,22 @@ impl Session {
         }
         self.push(step);
         Ok(())
+    }
+
+    /// Moves an atom a step, with those in reach, without recording it: what a page does while a hand drags. Places are
+    /// in samples, the reach is over the nominal distance.
+    ///
+    /// # Errors
+    /// [`JobError`] if nothing is open, or the atom may not be there; nothing has changed then.
+    pub fn drag(
+        &mut self,
+        atom: u32,
+        to: &[f64],
+        reach: f64,
+        watch: &mut dyn Watch,
+    ) -> Result<(), JobError> {
+        let model = self.model.as_mut().ok_or_else(nothing_open)?;
+        each!(model, model => model.drag(atom, to, reach, watch).map(drop))
     }
 
     /// Keeps the model before atoms are edited bit by bit; [`Session::record`] says in the end what was done.

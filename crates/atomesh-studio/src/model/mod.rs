@@ -224,7 +224,7 @@ impl<const D: usize> Model<D> {
     pub fn editor(&mut self, watch: &mut dyn Watch) -> Result<&mut Edited<D>, JobError> {
         if self.edited.is_none() {
             let settled = self.settled(watch)?;
-            let edited = Edited::new(settled.lattice().clone(), self.axes.delaunay.clone(), watch)?;
+            let edited = Edited::new(settled.lattice().clone(), self.axes.delaunay, watch)?;
             self.edited = Some(Arc::new(edited));
         }
         Ok(Arc::make_mut(self.edited.as_mut().expect("it was made above")))

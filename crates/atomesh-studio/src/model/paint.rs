@@ -144,7 +144,7 @@ impl<const D: usize> Model<D> {
         radius: f64,
         path: &[Point<D>],
     ) -> Result<(), JobError> {
-        if !(radius > 0.0) {
+        if radius.is_nan() || radius <= 0.0 {
             let message = format!("a brush of radius {radius}; expected a length above 0");
             return Err(JobError::misuse(message));
         }
