@@ -100,8 +100,7 @@ class App {
       const before = this.state;
       this.state = value;
       this.fillScenes(value.scenes);
-      const isOther = value.model && (!before?.model || before.model.name !== value.model.name
-        || String(before.model.shape) !== String(value.model.shape));
+      const isOther = value.model && value.image !== before?.image;
       if (isOther) this.showOther();
       if (value.error && value.error !== before?.error) this.say(value.error);
       if (!value.model) this.frames = {};

@@ -10,6 +10,7 @@ export class Wells {
   /** @param {any} app */
   constructor(app) {
     this.app = app;
+    this.dimsMesh = true;
     this.hint = "n puts a source, Shift + n a sink, Delete removes one; drag them.";
   }
 
@@ -61,7 +62,7 @@ export class Wells {
     const { app } = this;
     drawFacets(view, app.frames.facets, box, 3);
     const flow = app.frames.flow;
-    if (flow) view.drawing.strips("flow", flow.places, flow.lengths, box, [1, 1, 1, 0.8]);
+    if (flow) view.drawing.strips("flow", flow.places, flow.lengths, box, [0.85, 0.1, 0.75, 0.9]);
     const [nx, ny] = view.shape;
     const shown = this.wells.map((well, i) => (i === this.well && this.over ? this.over.at : well.at));
     const places = new Float32Array(shown.flatMap(([x, y]) => [x / (nx - 1), y / (ny - 1)]));

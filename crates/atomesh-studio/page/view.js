@@ -204,7 +204,7 @@ export class View {
     if (app.played) {
       this.drawPlayed(box);
     } else if (app.showsMesh && mesh && !isEditing) {
-      drawing.edges("mesh", mesh.places, mesh.edges, box, [0.35, 0.8, 1, 0.75]);
+      drawing.edges("mesh", mesh.places, mesh.edges, box, [0.35, 0.8, 1, app.tool.dimsMesh ? 0.35 : 0.75]);
     }
     if (app.dimension === 2 && !app.played) app.tool.draw?.(this, box);
     if (app.dimension === 3) this.drawCross(box);

@@ -56,6 +56,8 @@ struct Engine {
     revision: u32,
     /// Counts exhibits.
     shown: u32,
+    /// Counts images, and says which one it is by its place in memory.
+    image: (u32, usize),
     /// The revision of the atoms that pages show.
     atoms_revision: u32,
     /// Whether pages show atoms.
@@ -95,6 +97,7 @@ impl Engine {
             hub,
             revision: 0,
             shown: 0,
+            image: (0, 0),
             atoms_revision: 0,
             shows_atoms: false,
             drag: None,
@@ -236,6 +239,14 @@ impl Engine {
         self.error = None;
         self.revision += 1;
         self.figures = Value::Null;
+        self.hub.retract(Kind::Drag);
+        let image = self.session.model().map_or(0, |model| each!(model, m => m.opened_at()));
+        if image != self.image.1 {
+            self.image = (self.image.0 + 1, image);
+            // what was made of another image is not shown over this one
+            let kinds = [Kind::Mesh, Kind::Atoms, Kind::Facets, Kind::Flow];
+            kinds.into_iter().for_each(|kind| self.hub.retract(kind));
+        }
         self.exhibit();
         self.publish_state();
     }
@@ -346,6 +357,7 @@ impl Engine {
         let told = state::Told {
             revision: self.revision,
             shown: self.shown,
+            image: self.image.0,
             atoms_revision: self.atoms_revision,
             is_busy: self.has_work(),
             has_atoms: self.made.atoms,

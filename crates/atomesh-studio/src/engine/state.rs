@@ -23,6 +23,7 @@ const LOOKED_AT: usize = 1 << 18;
 pub struct Told<'a> {
     pub revision: u32,
     pub shown: u32,
+    pub image: u32,
     pub atoms_revision: u32,
     pub is_busy: bool,
     pub has_atoms: bool,
@@ -37,6 +38,7 @@ pub fn state(session: &Session, told: &Told<'_>) -> Value {
     json!({
         "revision": told.revision,
         "shown": told.shown,
+        "image": told.image,
         "atomsRevision": told.atoms_revision,
         "hasAtoms": told.has_atoms,
         "busy": told.is_busy,

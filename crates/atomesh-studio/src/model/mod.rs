@@ -173,6 +173,11 @@ impl<const D: usize> Model<D> {
         &self.opened
     }
 
+    /// Where the image is in memory, which tells it from others as long as it is open.
+    pub fn opened_at(&self) -> usize {
+        Arc::as_ptr(&self.opened).addr()
+    }
+
     /// The image, in place.
     pub fn image(&self) -> Option<&Image<D>> {
         self.stages.images().map(|images| &images.image)

@@ -283,6 +283,21 @@ fn a_flood_is_cut_off_and_long_messages_are_not_taken() {
 }
 
 #[test]
+fn what_cannot_be_made_is_said_and_undone() {
+    let folder = tempfile::tempdir().unwrap();
+    let studio = Studio::on_file(&image_file(folder.path()), "[lattice]\nsize = 8.0");
+    let cookie = studio.cookie();
+    let mut page = studio.page(&cookie);
+    let hash = page.hash();
+    page.act(json!({ "do": "set", "option": "lattice.size", "value": 0.001 }));
+    page.settle();
+    let error = page.state["error"].as_str().unwrap();
+    assert!(error.contains("below the sample step"), "{error}");
+    page.change(json!({ "op": "undo" }));
+    assert_eq!(page.hash(), hash);
+}
+
+#[test]
 fn eight_pages_are_enough() {
     let studio = Studio::empty();
     let cookie = studio.cookie();
