@@ -18,22 +18,27 @@ export function readFrame(buffer) {
     case "mesh":
       return { ...head, places: u16(16, 2 * head.first), edges: u32(16 + 4 * head.first, 2 * head.second) };
     case "atoms": {
-      const places = new Uint16Array(2 * head.first);
+      const d = head.dimension;
+      const size = d === 2 ? 8 : 12;
+      const places = new Uint16Array(d * head.first);
       const states = new Uint32Array(head.first);
       for (let i = 0; i < head.first; i++) {
-        places[2 * i] = view.getUint16(16 + 8 * i, true);
-        places[2 * i + 1] = view.getUint16(18 + 8 * i, true);
-        states[i] = view.getUint32(20 + 8 * i, true);
+        const at = 16 + size * i;
+        for (let k = 0; k < d; k++) places[d * i + k] = view.getUint16(at + 2 * k, true);
+        states[i] = view.getUint32(at + size - 4, true);
       }
-      return { ...head, places, states, cells: u32(16 + 8 * head.first, 3 * head.second) };
+      return { ...head, places, states, cells: u32(16 + size * head.first, 3 * head.second) };
     }
     case "drag": {
+      const d = head.dimension;
+      const size = d === 2 ? 8 : 12;
       const moves = [];
       for (let i = 0; i < head.first; i++) {
-        const at = 16 + 8 * i;
-        moves.push([view.getUint32(at, true), view.getUint16(at + 4, true), view.getUint16(at + 6, true)]);
+        const at = 16 + size * i;
+        const place = Array.from({ length: d }, (_, k) => view.getUint16(at + 4 + 2 * k, true));
+        moves.push({ atom: view.getUint32(at, true), place });
       }
-      const rest = u32(16 + 8 * head.first, head.second);
+      const rest = u32(16 + size * head.first, head.second);
       const removed = rest.slice(1, 1 + 3 * rest[0]);
       return { ...head, moves, removed, added: rest.slice(1 + 3 * rest[0]) };
     }

@@ -71,7 +71,7 @@ class App {
   markTool() {
     [...document.getElementById("tools").children].forEach((button, i) => {
       button.setAttribute("aria-pressed", String(this.tools[i + 1] === this.tool));
-      if (this.tools[i + 1]) /** @type {HTMLButtonElement} */ (button).disabled = this.dimension === 3 && i + 1 >= 4;
+      if (this.tools[i + 1]) /** @type {HTMLButtonElement} */ (button).disabled = this.dimension === 3 && i + 1 > 4;
     });
   }
 
@@ -119,7 +119,8 @@ class App {
     this.cross = this.shape.map((n) => Math.floor(n / 2));
     this.views = (this.dimension === 3 ? [2, 1, 0] : [2]).map((axis) => new View(this, parent, axis));
     this.space = this.dimension === 3 ? new Space(this, parent) : null;
-    if (this.dimension === 3 && (this.tool.showsAtoms || this.tool === this.tools[6] || this.tool === this.tools[7])) this.choose(1);
+    if (this.dimension === 3 && (this.tool === this.tools[6] || this.tool === this.tools[7])) this.choose(1);
+    this.tools[4].atoms = null;
     this.autoContrast();
     this.markTool();
   }
@@ -178,7 +179,7 @@ class App {
 
   choose(number) {
     const tool = this.tools[number];
-    if (!tool || tool === this.tool || (this.dimension === 3 && number >= 4)) return;
+    if (!tool || tool === this.tool || (this.dimension === 3 && number > 4)) return;
     this.tool.leave?.();
     this.tool = tool;
     tool.enter?.();

@@ -48,8 +48,8 @@ export class Atoms {
     if (!this.atoms || frame.revision !== this.atoms.revision) return;
     const places = this.base.places.slice();
     const colors = this.baseColors.slice();
-    for (const [atom, x, y] of frame.moves) {
-      places.set([x, y], 2 * atom);
+    for (const { atom, place } of frame.moves) {
+      places.set(place, frame.dimension * atom);
       colors.set(atom === this.atom ? COLORS.held : COLORS.moved, 4 * atom);
     }
     if (!this.slots) {
@@ -78,20 +78,36 @@ export class Atoms {
     this.app.redraw();
   }
 
+  /** An atom's place in samples. */
+  sample(i) {
+    const d = this.atoms.dimension;
+    return this.app.shape.map((n, k) => (this.atoms.places[d * i + k] / 65535) * (n - 1));
+  }
+
+  /** Whether an atom is there, and in space within half an edge of the slice. */
+  isIn(view, i) {
+    const { atoms, app } = this;
+    if (atoms.states[i] === 2) return false;
+    if (atoms.dimension === 2) return true;
+    const { axis } = view;
+    const off = (atoms.places[3 * i + axis] / 65535) * (app.shape[axis] - 1) - app.cross[axis];
+    return Math.abs(off) * app.step[axis] <= (app.distance?.mean ?? 0) / 2;
+  }
+
   /** The atom nearest to a place of the canvas, within reach of the hand. */
   nearest(view, x, y) {
     if (!this.atoms) return null;
+    const { places, states, dimension } = this.atoms;
     const [nx, ny] = view.shape;
-    const { places, states } = this.atoms;
+    const [a, b] = view.axes;
     let best = null;
     let least = NEAR * NEAR;
     const s = view.toSamples(x, y);
     const [px, py] = view.pixels;
     for (let i = 0; i < states.length; i++) {
-      if (states[i] === 2) continue;
-      const dx = ((places[2 * i] / 65535) * (nx - 1) - s[0]) * px;
-      const dy = ((places[2 * i + 1] / 65535) * (ny - 1) - s[1]) * py;
-      if (dx * dx + dy * dy < least) {
+      const dx = ((places[dimension * i + a] / 65535) * (nx - 1) - s[0]) * px;
+      const dy = ((places[dimension * i + b] / 65535) * (ny - 1) - s[1]) * py;
+      if (dx * dx + dy * dy < least && this.isIn(view, i)) {
         least = dx * dx + dy * dy;
         best = i;
       }
@@ -107,12 +123,15 @@ export class Atoms {
       this.app.say("This atom is pinned; f lets it go.");
       this.atom = null;
     }
+    if (this.atom !== null) this.depth = this.sample(this.atom)[view.axis];
   }
 
   move(view, event) {
     this.over = { view, at: view.toSamples(event.offsetX, event.offsetY) };
     if (this.atom !== null && this.atom !== undefined && !this.isFailed) {
-      this.pending = this.over.at;
+      this.pending = view.place(this.over.at);
+      // in space it stays as deep as it is
+      if (this.app.dimension === 3) this.pending[view.axis] = this.depth;
       this.step();
     }
     this.app.redraw();
@@ -148,7 +167,7 @@ export class Atoms {
   }
 
   add() {
-    if (this.over) this.app.do({ do: "add", at: this.over.at });
+    if (this.over) this.app.do({ do: "add", at: this.over.view.place(this.over.at) });
   }
 
   under() {
@@ -168,11 +187,29 @@ export class Atoms {
     if (atom !== null) this.app.do({ do: "pin", atom, pinned: this.atoms.states[atom] !== 1 });
   }
 
+  /** The places and colours of the atoms in a slice. */
+  inSlice(view) {
+    const [a, b] = view.axes;
+    const places = [];
+    const colors = [];
+    for (let i = 0; i < this.atoms.states.length; i++) {
+      if (!this.isIn(view, i)) continue;
+      places.push(this.atoms.places[3 * i + a], this.atoms.places[3 * i + b]);
+      colors.push(...this.colors.subarray(4 * i, 4 * i + 4));
+    }
+    return { places: Uint16Array.from(places), colors: Uint8Array.from(colors) };
+  }
+
   draw(view, box) {
     if (!this.atoms) return;
     const { drawing } = view;
-    drawing.edges("atoms", this.atoms.places, this.edges, box, [0.35, 0.8, 1, 0.6]);
-    drawing.points("atoms", this.atoms.places, this.colors, box, 8);
+    if (this.atoms.dimension === 2) {
+      drawing.edges("atoms", this.atoms.places, this.edges, box, [0.35, 0.8, 1, 0.6]);
+      drawing.points("atoms", this.atoms.places, this.colors, box, 8);
+    } else {
+      const { places, colors } = this.inSlice(view);
+      drawing.points("atoms", places, colors, box, 8);
+    }
     if (this.over?.view === view) {
       const d = view.value("distance", this.over.at);
       const radius = this.reach * (Number.isFinite(d) ? d : (this.app.distance?.mean ?? 0));

@@ -34,6 +34,7 @@ export class Paint {
 
   down(view, event) {
     this.path = [view.toSamples(event.offsetX, event.offsetY)];
+    this.pathView = view;
     this.erases = event.ctrlKey || event.metaKey;
     this.app.redraw();
   }
@@ -58,7 +59,7 @@ export class Paint {
 
   draw(view, box) {
     const ink = this.erases ? [1, 0.4, 0.4, 0.9] : [1, 1, 1, 0.9];
-    if (this.path) {
+    if (this.path && this.pathView === view) {
       const [nx, ny] = view.shape;
       const places = new Float32Array(this.path.flatMap(([x, y]) => [x / (nx - 1), y / (ny - 1)]));
       view.drawing.strips("stroke", places, [this.path.length], box, ink);

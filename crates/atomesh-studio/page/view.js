@@ -206,8 +206,8 @@ export class View {
     } else if (app.showsMesh && mesh && !isEditing) {
       drawing.edges("mesh", mesh.places, mesh.edges, box, [0.35, 0.8, 1, app.tool.dimsMesh ? 0.35 : 0.75]);
     }
-    if (app.dimension === 2 && !app.played) app.tool.draw?.(this, box);
     if (app.dimension === 3) this.drawCross(box);
+    if (!app.played) app.tool.draw?.(this, box);
     const title = app.dimension === 3 ? `${NAMES[this.axis]} = ${app.cross[this.axis]}` : "";
     if (this.label.textContent !== title) this.label.textContent = title;
   }

@@ -324,9 +324,8 @@ impl Engine {
             self.exhibit();
             self.publish_state();
         } else if self.shows_atoms && !self.made.atoms {
-            if let Some(frame) = each!(model, model => make_atoms(model, revision, watch))? {
-                self.hub.publish(Kind::Atoms, Frame::Binary(frame.into()));
-            }
+            let frame = each!(model, model => make_atoms(model, revision, watch))?;
+            self.hub.publish(Kind::Atoms, Frame::Binary(frame.into()));
             self.made.atoms = true;
             self.atoms_revision = revision;
             self.publish_state();
@@ -397,10 +396,9 @@ fn make_atoms<const D: usize>(
     model: &mut Model<D>,
     revision: u32,
     watch: &mut dyn atomesh::watch::Watch,
-) -> Result<Option<Vec<u8>>, JobError> {
+) -> Result<Vec<u8>, JobError> {
     let grid = model.grid();
-    let edited = model.editor(watch)?;
-    Ok((D == 2).then(|| view::atoms(edited, &grid, revision)))
+    Ok(view::atoms(model.editor(watch)?, &grid, revision))
 }
 
 fn make_flow<const D: usize>(

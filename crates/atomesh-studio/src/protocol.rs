@@ -30,11 +30,11 @@ pub enum Kind {
     State = 0,
     /// The mesh in the plane: so many places, and edges of two u32 each.
     Mesh = 1,
-    /// The atoms in the plane: so many atoms, each a place and a u32 that is 0 for an atom, 1 for a pinned one, 2 for one that
-    /// is gone; and the cells between them, three u32 each.
+    /// The atoms: so many, each a whole place and a u32 that is 0 for an atom, 1 for a pinned one, 2 for one that is gone;
+    /// and, in the plane, the cells between them, three u32 each. A whole place in space has a fourth u16, which is 0.
     Atoms = 2,
-    /// What an unfinished drag has changed since the atoms' revision: so many moves (u32, place), and so many u32 that follow:
-    /// the number of cells removed, their corners, and the corners of the cells added.
+    /// What an unfinished drag has changed since the atoms' revision: so many moves (u32, whole place), and so many u32 that
+    /// follow: the number of cells removed, their corners, and the corners of the cells added; in space no cells.
     Drag = 3,
     /// The facets of features in the plane: so many, each two places and a u32: the number of the feature, from 1, plus
     /// 65536 where it lets everything through; and nothing.
@@ -167,6 +167,14 @@ impl Arrays {
     /// Adds a place, of which some axes are seen.
     pub fn place<const D: usize>(&mut self, p: &Point<D>, grid: &Grid<D>, axes: [usize; 2]) {
         self.0.extend(axes.into_iter().flat_map(|k| share(p[k], grid, k).to_le_bytes()));
+    }
+
+    /// Adds a whole place.
+    pub fn whole_place<const D: usize>(&mut self, p: &Point<D>, grid: &Grid<D>) {
+        self.0.extend((0..D).flat_map(|k| share(p[k], grid, k).to_le_bytes()));
+        if D % 2 == 1 {
+            self.0.extend([0, 0]);
+        }
     }
 
     /// The frame.

@@ -1,4 +1,4 @@
-//! Frames of what is seen in the plane: the mesh, the atoms, a drag under way, facets and flow.
+//! Frames of what is seen: atoms and a drag under way, and in the plane the mesh, facets and flow.
 
 use std::collections::BTreeSet;
 
@@ -43,13 +43,13 @@ fn loop_edges(corners: &[u32]) -> Vec<[u32; 2]> {
     corners.iter().zip(next).map(|(a, b)| [*a.min(b), *a.max(b)]).collect()
 }
 
-/// The atoms and the cells between them.
+/// The atoms and, in the plane, the cells between them.
 pub fn atoms<const D: usize>(edited: &Edited<D>, grid: &Grid<D>, revision: u32) -> Vec<u8> {
-    let cells = edited.cells();
+    let cells = if D == 2 { edited.cells() } else { Vec::new() };
     let counts = [edited.atoms().len(), cells.len() / (D + 1)];
-    let mut arrays = Arrays::new(Kind::Atoms, 2, revision, counts);
+    let mut arrays = Arrays::new(Kind::Atoms, D, revision, counts);
     for atom in edited.atoms() {
-        arrays.place(&atom.map_or([0.0; D], |(place, _)| place), grid, AXES);
+        arrays.whole_place(&atom.map_or([0.0; D], |(place, _)| place), grid);
         arrays.numbers([match atom {
             Some((_, is_pinned)) => u32::from(is_pinned),
             None => 2,
@@ -71,6 +71,9 @@ impl Dragged {
     /// Adds what a step has changed.
     pub fn add<const D: usize>(&mut self, changes: &Changes<D>) {
         self.moved.extend(changes.moves().iter().map(|moved| moved.atom));
+        if D != 2 {
+            return;
+        }
         for cell in changes.cells_removed() {
             if !self.added.remove(cell) {
                 self.removed.insert(cell.to_vec());
@@ -93,11 +96,11 @@ impl Dragged {
         let corners = self.removed.iter().chain(&self.added).flatten();
         let numbers: Vec<u32> = corners.map(|name| edited.number(*name)).collect();
         let counts = [self.moved.len(), 1 + numbers.len()];
-        let mut arrays = Arrays::new(Kind::Drag, 2, revision, counts);
+        let mut arrays = Arrays::new(Kind::Drag, D, revision, counts);
         for name in &self.moved {
             let number = edited.number(*name);
             arrays.numbers([number]);
-            arrays.place(&edited.place(number).unwrap_or([0.0; D]), grid, AXES);
+            arrays.whole_place(&edited.place(number).unwrap_or([0.0; D]), grid);
         }
         arrays.numbers([self.removed.len() as u32]);
         arrays.numbers(numbers);

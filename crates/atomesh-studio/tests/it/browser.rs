@@ -515,6 +515,37 @@ fn a_volume_is_three_linked_slices() {
     tab.wheel(at, -100.0, 0);
     tab.until("studio.cross[2] === 49");
     assert_eq!(tab.value("studio.views[0].label.textContent"), "z = 49");
+    // an atom of the slice is dragged within it, and undone
+    let before = tab.value("studio.state.hash");
+    let undo = tab.value("studio.state.undo").as_u64().unwrap();
+    tab.key("4", 0);
+    tab.until("studio.tools[4].atoms && studio.state.hasAtoms && !studio.state.busy");
+    let found = tab.value(
+        "(() => { const t = studio.tools[4], v = studio.views[0]; let best = 0, least = 1e9; \
+         for (let i = 0; i < t.atoms.states.length; i++) { if (!t.isIn(v, i)) continue; const s = t.sample(i); \
+         const d = Math.hypot(s[0] - 24, s[1] - 24); if (d < least) { least = d; best = i; } } \
+         return [best, ...t.sample(best)]; })()",
+    );
+    let atom = found[0].as_u64().unwrap();
+    let sample: Vec<f64> = serde_json::from_value(json!([found[1], found[2], found[3]])).unwrap();
+    let from = tab.place(0, [sample[0], sample[1]]);
+    assert!(is_yellow(tab.picture().at(from)), "the atom is drawn");
+    tab.drag(&[from, [from[0] + 8.0, from[1] + 4.0], [from[0] + 14.0, from[1] + 6.0]], "left", 0);
+    tab.until(&format!(
+        "studio.state.undo === {} && !studio.state.busy && studio.state.hasAtoms",
+        undo + 1
+    ));
+    tab.keep_picture("volume-atoms.png");
+    assert_ne!(tab.value("studio.state.hash"), before);
+    let moved: Vec<f64> =
+        serde_json::from_value(tab.value(&format!("studio.tools[4].sample({atom})"))).unwrap();
+    assert!(
+        moved[0] > sample[0] + 1.0 && (moved[2] - sample[2]).abs() < 0.01,
+        "{sample:?} to {moved:?}"
+    );
+    tab.key("z", CTRL);
+    tab.until(&format!("studio.state.undo === {undo} && !studio.state.busy && studio.state.hash"));
+    assert_eq!(tab.value("studio.state.hash"), before);
     assert_eq!(tab.complaints(), Vec::<String>::new());
 }
 
