@@ -66,6 +66,20 @@ impl Studio {
         Self { folder, address, port, addresses, is_ended, thread: Some(thread), kept: None }
     }
 
+    /// A server of another process.
+    pub fn of_address(address: &str, folder: &Path) -> Self {
+        let port = address.split(['/', ':']).find_map(|part| part.parse().ok()).unwrap();
+        Self {
+            folder: folder.into(),
+            address: address.into(),
+            port,
+            addresses: Vec::new(),
+            is_ended: Arc::default(),
+            thread: None,
+            kept: None,
+        }
+    }
+
     /// Whether the server has ended by itself.
     pub fn has_ended(&self) -> bool {
         self.thread.as_ref().is_none_or(JoinHandle::is_finished)
@@ -225,7 +239,8 @@ impl Page {
         self.change(json!({ "op": "do", "gesture": gesture }));
     }
 
-    fn send(&mut self, command: &Value, seq: u32) {
+    /// Sends a command and waits for nothing.
+    pub fn send(&mut self, command: &Value, seq: u32) {
         let text = json!({ "seq": seq, "command": command }).to_string();
         self.socket.send(Message::text(text)).unwrap();
     }

@@ -1,17 +1,19 @@
 //! What is done over the protocol: it shows, is undone, survives a kill, and is exported as the command would have it.
 
+use std::io::{BufRead, BufReader};
 use std::path::Path;
+use std::process::{Command as Process, Stdio};
 
 use atomesh::watch::Silent;
 use atomesh_job::mesh::{MeshFileOptions, mesh_file};
 use atomesh_job::options::RunConfig;
-use atomesh_studio::Session;
 use atomesh_studio::protocol::{Command, Numbered};
 use atomesh_studio::replay::replay;
+use atomesh_studio::{Server, Session};
 use clap::{Args, FromArgMatches};
 use serde_json::{Value, json};
 
-use super::client::{Page, Studio, image_file};
+use super::client::{Page, Studio, TIME, image_file};
 
 const OPTIONS: &str = "[lattice]\nsize = 6.0\n";
 
@@ -429,4 +431,54 @@ fn mangled_commands_are_refused_or_done_and_never_end_the_studio() {
         }
     }
     assert!(read > 1000 && read < 3000 && done > 300, "{read} read, {done} done");
+}
+
+/// The folder that the child serves a session in.
+const CHILD: &str = "ATOMESH_STUDIO_CHILD";
+
+#[test]
+#[ignore = "is the process that the next test kills"]
+fn serves_until_it_is_killed() {
+    let Some(folder) = std::env::var_os(CHILD) else { return };
+    let session = Session::open(&Path::new(&folder).join("session"), &mut Silent).unwrap();
+    let server = Server::new(session, std::time::Duration::from_secs(60)).unwrap();
+    println!("\nserves {}", server.address());
+    server.run(|| false).unwrap();
+}
+
+#[test]
+fn a_kill_loses_at_most_the_gesture_under_way() {
+    let folder = tempfile::tempdir().unwrap();
+    let path = folder.path().join("session");
+    let mut session = Session::open(&path, &mut Silent).unwrap();
+    let mut run = RunConfig::parse(OPTIONS).unwrap();
+    run.input.image = Some(image_file(folder.path()));
+    session.open_file(run, &mut Silent).unwrap();
+    drop(session);
+    let mut child = Process::new(std::env::current_exe().unwrap())
+        .args(["edits::serves_until_it_is_killed", "--exact", "--ignored", "--nocapture"])
+        .env(CHILD, folder.path())
+        .stdout(Stdio::piped())
+        .spawn()
+        .unwrap();
+    let mut lines = BufReader::new(child.stdout.take().unwrap()).lines().map_while(Result::ok);
+    let address = lines.find_map(|line| line.strip_prefix("serves ").map(str::to_owned)).unwrap();
+    let studio = Studio::of_address(&address, &path);
+    let cookie = studio.cookie();
+    let mut page = studio.page(&cookie);
+    let stroke = |y: f64| json!({ "do": "paint", "field": "weight", "value": 0.8, "radius": 4.0, "path": [[8.0, y], [50.0, y]] });
+    (0..5).for_each(|y| page.act(stroke(5.0 * f64::from(y))));
+    // strokes under way, of which nobody knows how far they came
+    for y in 0..20 {
+        page.send(&json!({ "op": "do", "gesture": stroke(2.0 * f64::from(y)) }), 1000 + y);
+    }
+    child.kill().unwrap(); // SIGKILL
+    child.wait().unwrap();
+    let session = Session::open(&path, &mut Silent).unwrap();
+    let [done, taken_back] = session.counts();
+    assert!((5..=25).contains(&done) && taken_back == 0, "{done} strokes");
+    drop(session);
+    let again = Studio::serve(Session::open(&path, &mut Silent).unwrap(), TIME);
+    let own = again.cookie();
+    assert_eq!(again.page(&own).hash().len(), 16, "and goes on");
 }
