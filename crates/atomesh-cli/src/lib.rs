@@ -54,6 +54,10 @@ enum Command {
     Info(Box<commands::info::InfoArgs>),
     Check(commands::check::CheckArgs),
     Synth(commands::synth::SynthArgs),
+    #[cfg(feature = "studio")]
+    Studio(Box<commands::studio::StudioArgs>),
+    #[cfg(feature = "studio")]
+    Replay(commands::replay::ReplayArgs),
     Completions(commands::completions::CompletionsArgs),
     Man(commands::man::ManArgs),
 }
@@ -61,6 +65,10 @@ enum Command {
 impl Command {
     /// Whether it writes what there may be notes about.
     fn has_notes(&self) -> bool {
+        #[cfg(feature = "studio")]
+        if matches!(self, Self::Studio(_) | Self::Replay(_)) {
+            return false;
+        }
         !matches!(self, Self::Info(_) | Self::Check(_) | Self::Completions(_) | Self::Man(_))
     }
 }
@@ -94,6 +102,10 @@ impl Cli {
             Command::Info(args) => commands::info::run(&args, &mut watch),
             Command::Check(args) => commands::check::run(&args, &mut watch),
             Command::Synth(args) => commands::synth::run(args, &mut watch),
+            #[cfg(feature = "studio")]
+            Command::Studio(args) => commands::studio::run(*args, &mut watch),
+            #[cfg(feature = "studio")]
+            Command::Replay(args) => commands::replay::run(&args, &mut watch),
             Command::Completions(args) => Ok(commands::completions::run(&args, Cli::command())),
             Command::Man(args) => commands::man::run(&args, Cli::command()),
         };

@@ -27,6 +27,12 @@ pub fn signal() -> u8 {
     }
 }
 
+/// Whether a signal has asked the process to end.
+#[cfg(feature = "studio")]
+pub fn is_signalled() -> bool {
+    SIGNAL.load(Ordering::Relaxed) != 0
+}
+
 /// Held while files are written.
 static WRITING: Mutex<()> = Mutex::new(());
 
@@ -172,6 +178,12 @@ impl Progress {
             self.bar.set_prefix(phase.name());
             self.bar.set_message("");
         }
+    }
+
+    /// Tells what became of the work, unless all is to be quiet.
+    #[cfg(feature = "studio")]
+    pub fn tell(&self, line: &str) {
+        self.say(line);
     }
 
     /// Prints a line on standard error, unless all is to be quiet.
