@@ -21,7 +21,8 @@ pub fn pair_functions(book: &mut Book) -> Result<(), Failure> {
     // f = −φ′, by central differences, whose error is of the order of step² but for the bend at 3/2, which is left out
     let step = 1e-4;
     let slope = |u: f64| (pair::energy(u + step) - pair::energy(u - step)) / (2.0 * step);
-    let off = (0..200).map(|i| 0.01 * f64::from(i) + 0.005).map(|u| (pair::force(u) + slope(u)).abs());
+    let off =
+        (0..200).map(|i| 0.01 * f64::from(i) + 0.005).map(|u| (pair::force(u) + slope(u)).abs());
     let checked = [
         Checked { name: "f(1)", value: pair::force(1.0), range: [-1e-15, 1e-15] },
         Checked {
