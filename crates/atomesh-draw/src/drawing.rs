@@ -14,6 +14,9 @@ use crate::plane::{draw_atoms, draw_polygons, draw_triangles};
 use crate::slices::{draw_atoms_slices, draw_polyhedra, draw_slices};
 use crate::style::Style;
 
+type DrawAtoms<const D: usize> =
+    fn(&Image<D>, &[Vec<Point<D>>; D], &Style) -> Result<Picture, DrawError>;
+
 /// How meshes of `D` dimensions, in sample coordinates, are drawn.
 #[derive(Clone, Copy, Debug)]
 pub struct Drawing<const D: usize> {
@@ -22,7 +25,7 @@ pub struct Drawing<const D: usize> {
     /// Draws Voronoi cells over their image.
     pub cells: fn(&Image<D>, &PolyMesh<D>, &Style) -> Result<Picture, DrawError>,
     /// Draws atoms alone: in the plane those of the first list, in space those of the list of each slice, by its normal.
-    pub atoms: fn(&Image<D>, &[Vec<Point<D>>; D], &Style) -> Result<Picture, DrawError>,
+    pub atoms: DrawAtoms<D>,
     /// Draws parts of cells.
     pub parts: fn(&PartsPicture<'_, D>, &Style) -> Result<Picture, DrawError>,
     /// Draws flow.

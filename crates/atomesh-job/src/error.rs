@@ -8,6 +8,7 @@ use atomesh::enhance::EnhanceError;
 use atomesh::features::FeaturesError;
 use atomesh::measure::MeasureError;
 use atomesh::sample::SampleError;
+use atomesh_draw::DrawError;
 use atomesh_flow::FlowError;
 use atomesh_flow::solve::SolveError;
 use atomesh_io::image::{WriteError, WriteReason};
@@ -214,6 +215,12 @@ impl From<FeaturesError> for JobError {
             FeaturesError::PointCount { .. } => Self::content(error),
             _ => Self::misuse(error),
         }
+    }
+}
+
+impl From<DrawError> for JobError {
+    fn from(error: DrawError) -> Self {
+        Self::content(error)
     }
 }
 

@@ -94,7 +94,7 @@ impl Hierarchy {
         }
         let first_product = own.apply(&first);
         let (energy, along) = (inner(&first, &first_product), inner(&first, &right));
-        if !(energy > 0.0) {
+        if energy <= 0.0 {
             return first;
         }
         let far = along / energy;
