@@ -13,12 +13,6 @@ use crate::gesture::PaintedField;
 use crate::model::{Model, each};
 use crate::session::Session;
 
-/// Bins of the histogram.
-const BINS: usize = 64;
-
-/// Samples that the histogram looks at, at most.
-const LOOKED_AT: usize = 1 << 18;
-
 /// What the engine knows beside the session.
 pub struct Told<'a> {
     pub revision: u32,
@@ -80,7 +74,11 @@ fn of_model<const D: usize>(model: &Model<D>) -> Value {
         "direction": frame.direction().iter().map(|row| row.to_vec()).collect::<Vec<_>>(),
         "step": grid.step.as_slice(),
         "units": model.opened().shown.world.units,
-        "samples": image_values(model),
+        "samples": {
+            "least": model.opened().range.min,
+            "greatest": model.opened().range.max,
+            "bins": model.opened().bins.as_slice(),
+        },
         "options": model.run(),
         "distance": distance,
         "estimate": stages.prepared().map(|prepared| prepared.estimate()),
@@ -109,23 +107,6 @@ fn is_z_up<const D: usize>(model: &Model<D>) -> bool {
     let format = model.run().input.shown().and_then(ImageFormat::of);
     let direction = model.opened().shown.image.frame().direction();
     format.is_some_and(ImageFormat::z_is_height) && direction[D - 1][D - 1] > 0.0
-}
-
-/// The range of the samples, and their histogram.
-fn image_values<const D: usize>(model: &Model<D>) -> Value {
-    let image = model.image().unwrap_or(&model.opened().shown.image);
-    let samples = image.samples();
-    let range = model.opened().range;
-    let mut bins = [0_u32; BINS];
-    let step = samples.len().div_ceil(LOOKED_AT).max(1);
-    let extent = range.max - range.min;
-    for i in (0..samples.len()).step_by(step) {
-        let share = (samples.get(i) - range.min) / extent;
-        if (0.0..=1.0).contains(&share) {
-            bins[((share * BINS as f64) as usize).min(BINS - 1)] += 1;
-        }
-    }
-    json!({ "least": range.min, "greatest": range.max, "bins": bins.as_slice() })
 }
 
 /// The figures of the mesh: shape, and how it follows features.

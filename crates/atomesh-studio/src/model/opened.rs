@@ -4,7 +4,7 @@ use std::fs::File;
 use std::io::Read;
 use std::path::{Path, PathBuf};
 
-use atomesh::image::{Image, Range};
+use atomesh::image::{Image, Range, Samples};
 use atomesh::synth::{Scene, SynthOptions, synthesize};
 use atomesh::watch::Watch;
 use atomesh_io::image::AnyImage;
@@ -19,6 +19,12 @@ use crate::log::Source;
 /// Samples of a synthetic image along each axis, in the plane and in space.
 const SCENE_SHAPE: [usize; 2] = [256, 96];
 
+/// Bins of the histogram.
+const BINS: usize = 64;
+
+/// Samples that the histogram looks at, at most.
+const LOOKED_AT: usize = 1 << 18;
+
 /// An image as it was read or drawn.
 #[derive(Clone, Debug)]
 pub struct Opened<const D: usize> {
@@ -28,6 +34,8 @@ pub struct Opened<const D: usize> {
     pub shown: ShownImage<D>,
     /// The range of its samples.
     pub range: Range,
+    /// How many samples there are in each of equal parts of the range, of an even choice where there are many.
+    pub bins: Vec<u32>,
     /// What its reader took for granted.
     pub notes: Vec<String>,
 }
@@ -35,8 +43,22 @@ pub struct Opened<const D: usize> {
 impl<const D: usize> Opened<D> {
     fn new(name: String, shown: ShownImage<D>, notes: Vec<String>) -> Self {
         let range = shown.image.range();
-        Self { name, shown, range, notes }
+        let bins = histogram(shown.image.samples(), &range);
+        Self { name, shown, range, bins, notes }
     }
+}
+
+fn histogram(samples: &Samples, range: &Range) -> Vec<u32> {
+    let mut bins = vec![0; BINS];
+    let step = samples.len().div_ceil(LOOKED_AT).max(1);
+    let extent = range.max - range.min;
+    for i in (0..samples.len()).step_by(step) {
+        let share = (samples.get(i) - range.min) / extent;
+        if (0.0..=1.0).contains(&share) {
+            bins[((share * BINS as f64) as usize).min(BINS - 1)] += 1;
+        }
+    }
+    bins
 }
 
 /// An image of either dimension.
@@ -128,4 +150,21 @@ fn drawn<const D: usize>(scene: Scene, seed: u64) -> Result<Opened<D>, JobError>
     let image: Image<D> = synthesize(scene, &options).map_err(JobError::misuse)?.image;
     let shown = ShownImage { image, world: World::default() };
     Ok(Opened::new(scene.name().into(), shown, Vec::new()))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_histogram_counts_each_sample_once_and_no_nan() {
+        let of = |values: &[f32]| {
+            let samples = Samples::F32(values.to_vec().into());
+            histogram(&samples, &samples.range())
+        };
+        let bins = of(&[0.0, 0.0, 1.0, f32::NAN, 0.5]);
+        assert_eq!((bins[0], bins[32], bins[63]), (2, 1, 1));
+        assert_eq!(bins.iter().sum::<u32>(), 4);
+        assert_eq!(of(&[3.0; 5]).iter().sum::<u32>(), 0, "one value has no range");
+    }
 }
