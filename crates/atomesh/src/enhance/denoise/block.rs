@@ -6,6 +6,10 @@ use crate::image::Grid;
 /// The weight of a sample in its own mean where no other patch is like its own.
 pub(super) const LEAST_WEIGHT: f32 = 1e-6;
 
+/// 1 − u / 32 below which a weight is taken as 0: it would be 1e-29, which nothing adds up to, and a little below numbers
+/// lose digits, with which processors are slow.
+const LEAST_BASE: f32 = 0.125;
+
 /// Coordinate `axis` of element `number` of an array, its first axis fastest.
 pub(super) fn place<const D: usize>(number: usize, axis: usize, shape: &[usize; D]) -> usize {
     number / shape[..axis].iter().product::<usize>() % shape[axis]
@@ -166,7 +170,8 @@ impl<const D: usize> NoisyImage<'_, D> {
             let weights = &mut sums.weights[own.clone()];
             let greatest = &mut sums.greatest[own];
             for k in 0..n {
-                let weight = to_the_32nd(greater(lower(at_zero - slope * squares[k], 1.0), 0.0));
+                let base = lower(at_zero - slope * squares[k], 1.0);
+                let weight = to_the_32nd(if base < LEAST_BASE { 0.0 } else { base });
                 weighted[k] += weight * source[k];
                 weights[k] += weight;
                 greatest[k] = greater(greatest[k], weight);
