@@ -542,9 +542,9 @@ class OutputOptions(WorkOptions, total=False):
         What the picture shows behind the mesh: the image, the potential, the nominal distance, or the density of
         features, smoothed over the greatest nominal distance. Needs `picture` or `movie`. Default: image.
     movie : PathLike
-        Movie of the run, an animated .png: atoms on their way to the features over what `picture_of` names, at most 100
-        steps, and at last the mesh; sides of up to 640 pixels. In 3-D, the atoms within half an edge length of the
-        three slices through the middle, up to 900 pixels.
+        Movie of the run, an animated .png: atoms on their way to the features over what `picture_of` names, at most
+        100 steps, and at last the mesh; sides of up to 640 pixels. In 3-D, the atoms within half an edge length of
+        the three slices through the middle, up to 900 pixels.
     report : PathLike
         Figures of the mesh (shape, alignment, fidelity) and of the run, as JSON; as a page if the name ends in .html.
     html : PathLike
