@@ -248,6 +248,14 @@ pub(crate) fn check_extension(path: Option<&PathBuf>, wanted: &str) -> Result<()
     }
 }
 
+/// Refuses a file that Voronoi cells are not written to.
+pub(crate) fn check_voronoi(path: &Path) -> Result<(), JobError> {
+    match has_extension(path, "vtu") {
+        true => Ok(()),
+        false => Err(JobError::misuse("Voronoi cells are written as .vtu").about(path)),
+    }
+}
+
 /// Refuses a file for a potential whose format does not hold single precision.
 pub(crate) fn check_potential(path: &Path) -> Result<(), JobError> {
     match ImageFormat::from_path(path) {

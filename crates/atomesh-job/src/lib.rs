@@ -57,6 +57,7 @@ pub mod features;
 pub mod files;
 pub mod flow;
 pub mod images;
+mod in_samples;
 mod labels;
 pub mod measure;
 pub mod memory;

@@ -1,5 +1,7 @@
 // The view in space: the three slices where they are, and the surfaces of features. Dragging turns it.
 
+import { linked } from "./draw.js";
+
 const VERTEX = `#version 300 es
   uniform mat3 turn;
   uniform vec2 fit;
@@ -62,15 +64,7 @@ export class Space {
   begin() {
     const gl = this.canvas.getContext("webgl2", { alpha: false, antialias: true, preserveDrawingBuffer: true });
     this.gl = gl;
-    const program = gl.createProgram();
-    for (const [kind, source] of [[gl.VERTEX_SHADER, VERTEX], [gl.FRAGMENT_SHADER, FRAGMENT]]) {
-      const shader = gl.createShader(kind);
-      gl.shaderSource(shader, source);
-      gl.compileShader(shader);
-      if (!gl.getShaderParameter(shader, gl.COMPILE_STATUS)) throw new Error(gl.getShaderInfoLog(shader));
-      gl.attachShader(program, shader);
-    }
-    gl.linkProgram(program);
+    const program = linked(gl, VERTEX, FRAGMENT);
     gl.useProgram(program);
     gl.enable(gl.DEPTH_TEST);
     gl.enable(gl.BLEND);

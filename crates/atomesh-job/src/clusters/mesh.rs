@@ -11,11 +11,11 @@ use atomesh_io::mesh::cells::LoadedCells;
 use atomesh_io::mesh::{LoadedMesh, MeshFormat, Provenance};
 
 use super::ClustersRequest;
-use super::picture::InSamples;
 use crate::dimension::Dimension;
 use crate::error::JobError;
 use crate::features;
-use crate::files::has_extension;
+use crate::files::check_voronoi;
+use crate::in_samples::InSamples;
 use crate::sample::{Property, SampledMesh};
 use crate::session::Session;
 
@@ -207,10 +207,7 @@ impl<const D: usize> ClusteredMesh<D> for LoadedCells<D> {
     }
 
     fn check_output(&self, path: &Path) -> Result<(), JobError> {
-        if has_extension(path, "vtu") {
-            return Ok(());
-        }
-        Err(JobError::misuse("Voronoi cells are written as .vtu").about(path))
+        check_voronoi(path)
     }
 
     fn write(
@@ -228,7 +225,7 @@ impl<const D: usize> ClusteredMesh<D> for LoadedCells<D> {
     }
 
     fn in_samples(&self, frame: Option<&Frame<D>>) -> InSamples<D> {
-        InSamples::of_cells(&self.mesh, frame.unwrap_or(&self.frame))
+        InSamples::of_cells(&self.mesh, frame.or(Some(&self.frame)))
     }
 }
 

@@ -19,7 +19,7 @@ use super::write::FeatureFiles;
 use super::{FeaturesRequest, FeaturesSummary, potential};
 use crate::dimension::Dimension;
 use crate::error::JobError;
-use crate::files::{self, has_extension, write_bytes};
+use crate::files::{self, check_voronoi, write_bytes};
 use crate::images::{Beside, ImageRole};
 use crate::session::{Note, NoteKind, Session};
 use crate::surfaces::{feature_groups, points_of, world_axes};
@@ -127,12 +127,7 @@ fn check_options(request: &FeaturesRequest) -> Result<(), JobError> {
         let message = format!("--below {below}; expected a number below 0 for Voronoi cells");
         return Err(JobError::misuse(message).about(&request.mesh));
     }
-    match &request.mesh_output {
-        Some(path) if !has_extension(path, "vtu") => {
-            Err(JobError::misuse("Voronoi cells are written as .vtu").about(path))
-        }
-        _ => Ok(()),
-    }
+    request.mesh_output.as_deref().map_or(Ok(()), check_voronoi)
 }
 
 /// Whether the features that the cells name are taken.

@@ -7,7 +7,7 @@ use atomesh_io::output_group::OutputGroup;
 
 use super::options::FlowOutputOptions;
 use crate::error::JobError;
-use crate::files::{self, PictureFile, check_extension, has_extension};
+use crate::files::{self, PictureFile, check_extension, check_voronoi};
 use crate::options::InputOptions;
 use crate::session::Session;
 
@@ -98,11 +98,6 @@ impl FlowFiles {
             let message = "Voronoi cells have one pressure each; expected -o, which holds it";
             return Err(JobError::misuse(message).about(path));
         }
-        match &self.output {
-            Some(path) if !has_extension(path, "vtu") => {
-                Err(JobError::misuse("Voronoi cells are written as .vtu").about(path))
-            }
-            _ => Ok(()),
-        }
+        self.output.as_deref().map_or(Ok(()), check_voronoi)
     }
 }

@@ -2,9 +2,7 @@
 
 use atomesh::geometry::Point;
 use atomesh::image::Units;
-use atomesh::mesh::{Mesh, PolyMesh};
-use atomesh::run::lattice_mesh;
-use atomesh_draw::{FlowCells, FlowLine, FlowPicture, FlowStyle, FlowWell, Picture, Style};
+use atomesh_draw::{FlowLine, FlowPicture, FlowStyle, FlowWell, Picture, Style};
 use atomesh_flow::streamlines::Streamline;
 use atomesh_flow::{Setting, WellFlow};
 
@@ -12,6 +10,7 @@ use super::answer::FlowAnswer;
 use super::flow_mesh::{FlowMesh, FlowMeshCells};
 use crate::dimension::Dimension;
 use crate::error::JobError;
+use crate::in_samples::InSamples;
 
 /// What a picture shows of an answer.
 #[derive(Clone, Copy, Debug)]
@@ -46,7 +45,7 @@ impl<const D: usize> FlowDrawing<'_, D> {
         let Self { answer, setting, shown } = *self;
         let FlowPictureOptions { shows_pressure, lines, max_side } = *shown;
         let mesh = &answer.mesh;
-        let shape = Shape::new(mesh);
+        let shape = in_samples(mesh);
         let turn = |v: &Point<D>| turned(mesh, v);
         let velocities: Vec<Point<D>> = answer.velocities.iter().map(turn).collect();
         let wells: Vec<FlowWell<D>> = (answer.problem.wells.iter())
@@ -89,31 +88,11 @@ impl<const D: usize> FlowDrawing<'_, D> {
 }
 
 /// The cells in sample coordinates.
-enum Shape<const D: usize> {
-    Simplices(Mesh<D>),
-    Polytopes(Box<PolyMesh<D>>),
-}
-
-impl<const D: usize> Shape<D> {
-    fn new(flow_mesh: &FlowMesh<D>) -> Self {
-        let frame = flow_mesh.frame.as_ref();
-        match &flow_mesh.cells {
-            FlowMeshCells::Voronoi { cells, .. } => {
-                let mirrored = frame.is_some_and(|frame| frame.is_mirrored());
-                Self::Polytopes(Box::new(cells.moved(mirrored, |p| place(flow_mesh, p))))
-            }
-            FlowMeshCells::Simplices { mesh, .. } => Self::Simplices(match frame {
-                Some(frame) => lattice_mesh(mesh, frame, Units::Samples),
-                None => mesh.clone(),
-            }),
-        }
-    }
-
-    fn cells(&self) -> FlowCells<'_, D> {
-        match self {
-            Self::Simplices(mesh) => FlowCells::Simplices(mesh),
-            Self::Polytopes(cells) => FlowCells::Polytopes(cells),
-        }
+fn in_samples<const D: usize>(mesh: &FlowMesh<D>) -> InSamples<D> {
+    let frame = mesh.frame.as_ref();
+    match &mesh.cells {
+        FlowMeshCells::Voronoi { cells, .. } => InSamples::of_cells(cells, frame),
+        FlowMeshCells::Simplices { mesh, .. } => InSamples::of_mesh(mesh, frame),
     }
 }
 

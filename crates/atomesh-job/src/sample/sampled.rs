@@ -14,7 +14,7 @@ use atomesh_io::mesh::{
 use super::Property;
 use crate::dimension::Dimension;
 use crate::error::JobError;
-use crate::files::has_extension;
+use crate::files::check_voronoi;
 use crate::session::Session;
 
 /// A mesh as read, whose cells get properties and go into another file.
@@ -147,10 +147,7 @@ impl<const D: usize> SampledMesh<D> for LoadedCells<D> {
     }
 
     fn check_output(&self, path: &Path) -> Result<(), JobError> {
-        if has_extension(path, "vtu") {
-            return Ok(());
-        }
-        Err(JobError::misuse("Voronoi cells are written as .vtu").about(path))
+        check_voronoi(path)
     }
 
     fn write(
