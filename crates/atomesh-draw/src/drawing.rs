@@ -12,10 +12,13 @@ use crate::parts::{PartsPicture, draw_parts, draw_parts_slices};
 use crate::picture::Picture;
 use crate::plane::{draw_atoms, draw_polygons, draw_triangles};
 use crate::slices::{draw_atoms_slices, draw_polyhedra, draw_slices};
+use crate::space::{SpacePicture, draw_space};
 use crate::style::Style;
 
 type DrawAtoms<const D: usize> =
     fn(&Image<D>, &[Vec<Point<D>>; D], &Style) -> Result<Picture, DrawError>;
+
+type DrawSpace<const D: usize> = fn(&SpacePicture<'_, D>, &Style) -> Result<Picture, DrawError>;
 
 /// How meshes of `D` dimensions, in sample coordinates, are drawn.
 #[derive(Clone, Copy, Debug)]
@@ -28,6 +31,8 @@ pub struct Drawing<const D: usize> {
     pub atoms: DrawAtoms<D>,
     /// Draws parts of cells.
     pub parts: fn(&PartsPicture<'_, D>, &Style) -> Result<Picture, DrawError>,
+    /// Draws surfaces and cells in space; `None` in the plane.
+    pub space: Option<DrawSpace<D>>,
     /// Draws flow.
     pub flow: fn(&FlowPicture<'_, D>, &Style, &FlowStyle) -> Result<Picture, DrawError>,
 }
@@ -41,6 +46,7 @@ impl Drawing<2> {
             cells: draw_polygons,
             atoms: |image, [atoms, _], style| draw_atoms(image, atoms, style),
             parts: draw_parts,
+            space: None,
             flow: draw_flow,
         }
     }
@@ -59,6 +65,7 @@ impl Drawing<3> {
                 draw_atoms_slices(image, atoms.each_ref().map(Vec::as_slice), middle(image), style)
             },
             parts: draw_parts_slices,
+            space: Some(draw_space),
             flow: |flow, style, flow_style| draw_flow_slices(flow, None, style, flow_style),
         }
     }

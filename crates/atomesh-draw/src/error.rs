@@ -40,6 +40,14 @@ pub enum DrawError {
         /// How many facets there are.
         count: usize,
     },
+    /// A surface has a corner that is not a point of the mesh.
+    #[error("a surface with point {point}; the mesh has {count} points")]
+    Point {
+        /// Its number.
+        point: u32,
+        /// How many points there are.
+        count: usize,
+    },
     /// A number of a style is out of range.
     #[error("{name} is {value}; expected a finite number above 0{}", limit.map_or(String::new(), |l| format!(" and up to {l}")))]
     Style {

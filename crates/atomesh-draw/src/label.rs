@@ -1,4 +1,4 @@
-//! The letters that name slices and colours, and digits, as strokes: no font is needed, and PNG and SVG agree.
+//! Capital letters and digits as strokes: no font is needed, and PNG and SVG agree.
 
 use crate::shape::{Place, Rect, Shape};
 
@@ -20,7 +20,19 @@ const RIGHT_UP: [Place; 2] = [[1.0, 0.0], [1.0, 0.5]];
 const RIGHT_DOWN: [Place; 2] = [[1.0, 0.5], [1.0, 1.0]];
 const SLOPES: [[Place; 2]; 2] = [[[0.0, 0.0], [0.5, 0.5]], [[0.5, 0.5], [1.0, 0.0]]];
 
-/// The strokes of a letter in a unit square, y down.
+/// A ring with its corners cut.
+const RING: [[Place; 2]; 8] = [
+    [[0.3, 0.0], [0.7, 0.0]],
+    [[0.7, 0.0], [1.0, 0.3]],
+    [[1.0, 0.3], [1.0, 0.7]],
+    [[1.0, 0.7], [0.7, 1.0]],
+    [[0.7, 1.0], [0.3, 1.0]],
+    [[0.3, 1.0], [0.0, 0.7]],
+    [[0.0, 0.7], [0.0, 0.3]],
+    [[0.0, 0.3], [0.3, 0.0]],
+];
+
+/// The strokes of a letter in a unit square, y down; none of what is not known.
 fn strokes(letter: char) -> &'static [[Place; 2]] {
     match letter {
         'X' => &[[[0.0, 0.0], [1.0, 1.0]], [[1.0, 0.0], [0.0, 1.0]]],
@@ -38,13 +50,68 @@ fn strokes(letter: char) -> &'static [[Place; 2]] {
         '7' => &[TOP, [[1.0, 0.0], [0.4, 1.0]]],
         '8' => &[TOP, MIDDLE, BOTTOM, LEFT_UP, LEFT_DOWN, RIGHT_UP, RIGHT_DOWN],
         '9' => &[MIDDLE, LEFT_UP, TOP, RIGHT_UP, RIGHT_DOWN, BOTTOM],
+        'A' => &[
+            [[0.0, 1.0], [0.0, 0.3]],
+            [[0.0, 0.3], [0.5, 0.0]],
+            [[0.5, 0.0], [1.0, 0.3]],
+            [[1.0, 0.3], [1.0, 1.0]],
+            [[0.0, 0.6], [1.0, 0.6]],
+        ],
+        'B' => &[
+            LEFT_UP,
+            LEFT_DOWN,
+            [[0.0, 0.0], [0.7, 0.0]],
+            [[0.7, 0.0], [0.9, 0.25]],
+            [[0.9, 0.25], [0.7, 0.5]],
+            [[0.7, 0.5], [0.0, 0.5]],
+            [[0.7, 0.5], [1.0, 0.75]],
+            [[1.0, 0.75], [0.7, 1.0]],
+            [[0.7, 1.0], [0.0, 1.0]],
+        ],
+        'C' => &[TOP, BOTTOM, LEFT_UP, LEFT_DOWN],
+        'D' => &[
+            LEFT_UP,
+            LEFT_DOWN,
+            [[0.0, 0.0], [0.6, 0.0]],
+            [[0.6, 0.0], [1.0, 0.35]],
+            [[1.0, 0.35], [1.0, 0.65]],
+            [[1.0, 0.65], [0.6, 1.0]],
+            [[0.6, 1.0], [0.0, 1.0]],
+        ],
         'E' => &[TOP, MIDDLE, BOTTOM, LEFT_UP, LEFT_DOWN],
+        'F' => &[TOP, MIDDLE, LEFT_UP, LEFT_DOWN],
+        'G' => &[TOP, BOTTOM, LEFT_UP, LEFT_DOWN, RIGHT_DOWN, [[0.5, 0.5], [1.0, 0.5]]],
+        'H' => &[LEFT_UP, LEFT_DOWN, RIGHT_UP, RIGHT_DOWN, MIDDLE],
         'I' => &[[[0.5, 0.0], [0.5, 1.0]]],
+        'J' => &[RIGHT_UP, RIGHT_DOWN, BOTTOM, [[0.0, 0.7], [0.0, 1.0]]],
+        'K' => &[LEFT_UP, LEFT_DOWN, [[0.0, 0.5], [1.0, 0.0]], [[0.0, 0.5], [1.0, 1.0]]],
+        'L' => &[LEFT_UP, LEFT_DOWN, BOTTOM],
         'M' => &[LEFT_UP, LEFT_DOWN, RIGHT_UP, RIGHT_DOWN, SLOPES[0], SLOPES[1]],
+        'N' => &[LEFT_UP, LEFT_DOWN, RIGHT_UP, RIGHT_DOWN, [[0.0, 0.0], [1.0, 1.0]]],
+        'O' => &RING,
         'P' => &[TOP, MIDDLE, LEFT_UP, LEFT_DOWN, RIGHT_UP],
+        'Q' => &[
+            RING[0],
+            RING[1],
+            RING[2],
+            RING[3],
+            RING[4],
+            RING[5],
+            RING[6],
+            RING[7],
+            [[0.6, 0.7], [1.0, 1.0]],
+        ],
         'R' => &[TOP, MIDDLE, LEFT_UP, LEFT_DOWN, RIGHT_UP, [[0.5, 0.5], [1.0, 1.0]]],
         'T' => &[TOP, [[0.5, 0.0], [0.5, 1.0]]],
         'U' => &[LEFT_UP, LEFT_DOWN, BOTTOM, RIGHT_UP, RIGHT_DOWN],
+        'V' => &[[[0.0, 0.0], [0.5, 1.0]], [[0.5, 1.0], [1.0, 0.0]]],
+        'W' => &[
+            [[0.0, 0.0], [0.2, 1.0]],
+            [[0.2, 1.0], [0.5, 0.4]],
+            [[0.5, 0.4], [0.8, 1.0]],
+            [[0.8, 1.0], [1.0, 0.0]],
+        ],
+        '_' => &[BOTTOM],
         _ => &[],
     }
 }

@@ -98,7 +98,7 @@ mod tests {
 
     #[test]
     fn all_letters_of_names_and_numbers_are_known_and_stay_within_the_strip() {
-        for text in ["PRESSURE", "TIME", "0123456789", "-.E"] {
+        for text in ["ABCDEFGHIJKLMNOPQRSTUVWXYZ", "0123456789", "-._"] {
             for letter in text.chars() {
                 let strokes = lettering(&letter.to_string(), [0.0; 2], LETTER);
                 assert!(!strokes.is_empty(), "{letter}");

@@ -4,7 +4,8 @@
 //! field, as in his figure 5; [`draw_slices`] lays the cuts of a tetrahedral mesh over the three
 //! orthogonal slices of its image, as in his figure 9; [`draw_polygons`] and [`draw_polyhedra`] do the same for
 //! Voronoi cells, [`draw_curves`] plots functions, as in his figure 3. [`draw_flow`] and [`draw_flow_slices`] show what
-//! flows on a mesh, [`draw_parts`] and [`draw_parts_slices`] parts of its cells. [`Drawing`] holds them for callers
+//! flows on a mesh, [`draw_parts`] and [`draw_parts_slices`] parts of its cells, [`draw_space`] surfaces and cells in space, as
+//! in his figure 10. [`Drawing`] holds them for callers
 //! that are generic over the dimension. All return a [`Picture`], a list of what to draw and where, which becomes PNG
 //! or SVG; [`encode_movie`] makes an animated PNG of several; [`ReportPage`] is a report with its pictures as one HTML file. The same input gives the same bytes.
 //!
@@ -31,6 +32,7 @@ mod raster;
 mod scale;
 mod shape;
 mod slices;
+mod space;
 mod style;
 mod svg;
 mod ticks;
@@ -48,4 +50,5 @@ pub use parts::{PartsPicture, draw_parts, draw_parts_slices};
 pub use picture::{Picture, PictureFormat};
 pub use plane::{draw_atoms, draw_polygons, draw_triangles};
 pub use slices::{draw_atoms_slices, draw_polyhedra, draw_slices};
+pub use space::{Sheet, SpacePicture, draw_space};
 pub use style::{Color, Style};

@@ -58,7 +58,7 @@ impl Picture {
     /// The number of lines, dots and other parts, which decides how large it is as SVG.
     pub(crate) fn shape_count(&self) -> usize {
         let count = |shape: &Shape| match shape {
-            Shape::Image { .. } | Shape::Fill { .. } => 1,
+            Shape::Image { .. } | Shape::Colors { .. } | Shape::Fill { .. } => 1,
             Shape::Lines { lines, .. } => lines.len(),
             Shape::Discs { centers, .. } | Shape::Squares { centers, .. } => centers.len(),
             Shape::Polygons { polygons, .. } | Shape::Tint { polygons, .. } => polygons.len(),

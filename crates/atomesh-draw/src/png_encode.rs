@@ -3,7 +3,7 @@
 use tiny_skia::{FillRule, LineCap, Paint, PathBuilder, Pixmap, Stroke, Transform};
 
 use crate::error::DrawError;
-use crate::raster::Raster;
+use crate::raster::{ColorRaster, Raster};
 use crate::shape::{Place, Shape};
 use crate::style::Color;
 
@@ -35,6 +35,12 @@ pub(crate) fn encode_raster(raster: &Raster) -> Result<Vec<u8>, DrawError> {
     rgb_png(raster.columns as u32, raster.rows as u32, png::ColorType::Grayscale, &raster.greys)
 }
 
+/// Pixels in colour as a PNG of their own size.
+pub(crate) fn encode_colors(raster: &ColorRaster) -> Result<Vec<u8>, DrawError> {
+    let bytes = raster.colors.as_flattened();
+    rgb_png(raster.columns as u32, raster.rows as u32, png::ColorType::Rgb, bytes)
+}
+
 fn rgb_png(
     width: u32,
     height: u32,
@@ -58,6 +64,7 @@ fn draw(pixmap: &mut Pixmap, shape: &Shape) {
         Shape::Image { raster, corner, right, down } => {
             image(pixmap, raster, *corner, [*right, *down]);
         }
+        Shape::Colors { raster, corner } => colors(pixmap, raster, *corner),
         Shape::Fill { rect, color } => {
             let [x, y] = rect.corner.map(|v| v as f32);
             let [w, h] = rect.size.map(|v| v as f32);
@@ -137,6 +144,20 @@ fn paint([r, g, b]: Color) -> Paint<'static> {
     let mut paint = Paint::default();
     paint.set_color_rgba8(r, g, b, 255);
     paint
+}
+
+/// Puts pixels in colour where they belong; those outside the picture are left out.
+fn colors(pixmap: &mut Pixmap, raster: &ColorRaster, corner: Place) {
+    let [left, top] = corner.map(|v| v.round() as i64);
+    let (width, height) = (i64::from(pixmap.width()), i64::from(pixmap.height()));
+    let pixels = pixmap.pixels_mut();
+    for (at, [r, g, b]) in raster.colors.iter().enumerate() {
+        let (x, y) = (left + (at % raster.columns) as i64, top + (at / raster.columns) as i64);
+        if (0..width).contains(&x) && (0..height).contains(&y) {
+            pixels[(y * width + x) as usize] =
+                tiny_skia::ColorU8::from_rgba(*r, *g, *b, 255).premultiply();
+        }
+    }
 }
 
 /// Gives each pixel of the parallelogram the grey of the sample that its centre lies on.

@@ -1,6 +1,8 @@
-//! Image samples as greys.
+//! Image samples as greys, and pixels in colour.
 
 use atomesh::image::Samples;
+
+use crate::style::Color;
 
 /// The share of samples beyond each end of the range of greys.
 const CUT: f64 = 0.005;
@@ -14,6 +16,14 @@ pub(crate) struct Raster {
     pub columns: usize,
     pub rows: usize,
     pub greys: Vec<u8>,
+}
+
+/// Colours on a grid of `columns` × `rows`, row 0 on top.
+#[derive(Clone, Debug, PartialEq)]
+pub(crate) struct ColorRaster {
+    pub columns: usize,
+    pub rows: usize,
+    pub colors: Vec<Color>,
 }
 
 /// Maps sample values to greys.

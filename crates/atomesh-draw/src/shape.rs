@@ -1,6 +1,6 @@
 //! The shapes of a picture, in pixels, x to the right and y down.
 
-use crate::raster::Raster;
+use crate::raster::{ColorRaster, Raster};
 use crate::style::Color;
 
 /// A place in a picture, in pixels from its upper left corner.
@@ -19,6 +19,8 @@ pub(crate) enum Shape {
     /// A raster stretched over a parallelogram, each sample a parallelogram of one grey. Sample 0 is at
     /// `corner`; `right` and `down` are the sides along a row and a column.
     Image { raster: Raster, corner: Place, right: Place, down: Place },
+    /// Pixels in colour, from a corner on.
+    Colors { raster: ColorRaster, corner: Place },
     /// A filled rectangle.
     Fill { rect: Rect, color: Color },
     /// Straight lines, round at their ends.

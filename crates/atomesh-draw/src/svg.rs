@@ -7,7 +7,7 @@ use base64::engine::general_purpose::STANDARD;
 
 use crate::error::DrawError;
 use crate::png_encode;
-use crate::raster::Raster;
+use crate::raster::{ColorRaster, Raster};
 use crate::shape::{Place, Shape};
 use crate::style::Color;
 
@@ -29,6 +29,7 @@ fn draw(out: &mut String, shape: &Shape) -> Result<(), DrawError> {
         Shape::Image { raster, corner, right, down } => {
             image(out, raster, *corner, [*right, *down])?;
         }
+        Shape::Colors { raster, corner } => colors(out, raster, *corner)?,
         Shape::Fill { rect, color } => {
             let [[x, y], [w, h]] = [rect.corner, rect.size].map(|p| p.map(number));
             let color = hex(*color);
@@ -79,6 +80,20 @@ fn image(
             "<image width=\"{w}\" height=\"{h}\" \
              transform=\"matrix({a:.6} {b:.6} {c:.6} {d:.6} {e} {f})\" \
              style=\"image-rendering:pixelated\" href=\"data:image/png;base64,{png}\"/>"
+        ),
+    );
+    Ok(())
+}
+
+/// Pixels in colour.
+fn colors(out: &mut String, raster: &ColorRaster, corner: Place) -> Result<(), DrawError> {
+    let png = STANDARD.encode(png_encode::encode_colors(raster)?);
+    let (w, h) = (raster.columns, raster.rows);
+    let [x, y] = corner.map(number);
+    line(
+        out,
+        format_args!(
+            "<image x=\"{x}\" y=\"{y}\" width=\"{w}\" height=\"{h}\" href=\"data:image/png;base64,{png}\"/>"
         ),
     );
     Ok(())

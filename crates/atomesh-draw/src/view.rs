@@ -19,7 +19,7 @@ const ELEVATION: f64 = 0.45;
 const MARGIN: f64 = 0.04;
 
 /// The grey of the brightest sample; brighter than elsewhere, since there are no edges.
-const BRIGHTNESS: f64 = 0.85;
+pub(crate) const BRIGHTNESS: f64 = 0.85;
 
 /// The colours behind the slices and of their outlines.
 pub(crate) const BACKGROUND: [u8; 3] = [58, 62, 72];
@@ -83,8 +83,14 @@ impl Camera {
         std::array::from_fn(|k| (0..3).map(|axis| p[axis] * self.axes[axis][k]).sum())
     }
 
-    /// What puts a box of these sides into the middle of the rectangle.
-    pub fn fit(&self, sides: &Point<3>, rect: &Rect) -> Fit {
+    /// How large a box of these sides is as it is seen, with its margins.
+    pub fn seen(&self, sides: &Point<3>) -> Place {
+        let (min, max) = self.outline(sides);
+        std::array::from_fn(|k| (max[k] - min[k]) / (1.0 - 2.0 * MARGIN))
+    }
+
+    /// The least and the greatest places of a box of these sides.
+    fn outline(&self, sides: &Point<3>) -> (Place, Place) {
         let corners = (0..8).map(|i| {
             let corner = std::array::from_fn(|k| if i >> k & 1 == 1 { sides[k] } else { 0.0 });
             self.project(&corner)
@@ -95,6 +101,12 @@ impl Camera {
                 (min[k], max[k]) = (min[k].min(c[k]), max[k].max(c[k]));
             }
         }
+        (min, max)
+    }
+
+    /// What puts a box of these sides into the middle of the rectangle.
+    pub fn fit(&self, sides: &Point<3>, rect: &Rect) -> Fit {
+        let (min, max) = self.outline(sides);
         let scale = |k: usize| rect.size[k] * (1.0 - 2.0 * MARGIN) / (max[k] - min[k]);
         let scale = scale(0).min(scale(1));
         let middle = |k: usize| rect.corner[k] + rect.size[k] / 2.0;

@@ -58,6 +58,7 @@ pub mod files;
 pub mod flow;
 pub mod images;
 mod in_samples;
+mod in_space;
 mod labels;
 pub mod measure;
 pub mod memory;

@@ -23,7 +23,7 @@ impl<const D: usize> FlowCells<'_, D> {
         }
     }
 
-    pub(super) fn points(&self) -> &[Point<D>] {
+    pub(crate) fn points(&self) -> &[Point<D>] {
         match self {
             Self::Simplices(mesh) => mesh.points(),
             Self::Polytopes(mesh) => mesh.points(),

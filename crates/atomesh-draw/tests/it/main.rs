@@ -2,3 +2,5 @@
 
 mod flow_pictures;
 mod pictures;
+mod pixels;
+mod space_pictures;

@@ -19,7 +19,7 @@ use crate::features::FeaturesRequest;
 use crate::files::{self, PictureFile};
 use crate::images::{Beside, ImageRole};
 use crate::mesh_file::{self, MeshFile};
-use crate::options::{FrameOptions, PotentialOptions};
+use crate::options::{FrameOptions, PotentialOptions, View};
 use crate::session::Session;
 #[cfg(feature = "clap")]
 use crate::values::{count_in, named, number_in};
@@ -63,6 +63,11 @@ pub struct ClustersRequest {
     /// Picture of the parts, over the image if one is given: .png .svg
     #[cfg_attr(feature = "clap", arg(long, value_name = "PICTURE"))]
     pub picture: Option<PathBuf>,
+    /// What the picture of a volume shows: three slices; 3d, in space, the borders of the parts; or cut-away, in space, the
+    /// cells, an eighth of them cut away. Needs --picture. Default: slices
+    #[cfg_attr(feature = "clap", arg(long, value_name = "VIEW", requires = "picture",
+        value_parser = named::<View>(&["slices", "3d", "cut-away"])))]
+    pub view: Option<View>,
     /// File for the parts in numbers (cells, area or volume, box, the cuts between them), as JSON
     #[cfg_attr(feature = "clap", arg(long, value_name = "JSON"))]
     pub json: Option<PathBuf>,
@@ -92,6 +97,7 @@ impl Default for ClustersRequest {
             contrast,
             multiplier,
             picture: None,
+            view: None,
             json: None,
             units: None,
             features: PotentialOptions::default(),
@@ -279,6 +285,7 @@ fn run<const D: usize>(
     dimension: &Dimension<D>,
     session: &mut Session<'_>,
 ) -> Result<ClustersSummary, JobError> {
+    request.view.unwrap_or_default().check_dimension(D)?;
     if let Some(path) = &request.output {
         loaded.check_output(path)?;
     }

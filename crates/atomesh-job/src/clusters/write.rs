@@ -37,8 +37,9 @@ impl<const D: usize, M: ClusteredMesh<D>> Writing<'_, D, M> {
         let Self { request, loaded, found, .. } = *self;
         if let Some(file) = &self.picture {
             session.begin(Phase::Draw);
-            let drawn =
-                picture::picture(loaded, found, self.image.as_ref(), &self.style(), dimension)?;
+            let (image, view) = (self.image.as_ref(), request.view.unwrap_or_default());
+            let shown = picture::Shown { parts: &found.parts, image, view };
+            let drawn = picture::picture(loaded, &shown, &self.style(), dimension)?;
             file.staged(group)?.write(&drawn)?;
         }
         session.begin(Phase::Write);

@@ -250,6 +250,7 @@ impl FileRun<'_> {
         session: &mut Session<'_>,
     ) -> Result<MeshSummary, JobError> {
         let (run, outputs) = (self.run, self.outputs);
+        outputs.view.check_dimension(D)?;
         let images = MeshImages::read_fields(run, image, dimension, session)?;
         let world = images.world.clone();
         let (prepared, image) = prepare(run, images, dimension, session)?;

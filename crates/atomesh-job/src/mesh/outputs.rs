@@ -9,7 +9,7 @@ use atomesh_io::output_group::OutputGroup;
 use super::format::{MshWish, OutputFormat};
 use crate::error::JobError;
 use crate::files::{self, PictureFile, has_extension, unknown_extension};
-use crate::options::{Backdrop, OutputOptions, RunConfig};
+use crate::options::{Backdrop, OutputOptions, RunConfig, View};
 use crate::session::Session;
 use crate::values::{MaterialSpec, Text};
 
@@ -21,6 +21,7 @@ pub(super) struct Outputs {
     pub connections: Option<ConnectionFiles>,
     pub picture: Option<PictureFile>,
     pub backdrop: Backdrop,
+    pub view: View,
     /// The movie of the run.
     pub movie: Option<PathBuf>,
     pub report: Option<PathBuf>,
@@ -85,6 +86,7 @@ impl Outputs {
             connections,
             picture,
             backdrop: options.picture_of.unwrap_or_default(),
+            view: options.view.unwrap_or_default(),
             movie: options.movie.clone(),
             report,
             html,

@@ -5,10 +5,10 @@ use std::path::Path;
 
 use atomesh::features::FeatureFacetOptions;
 use atomesh::image::{Image, Samples};
-use atomesh::mesh::{Mesh, Regions, Tags};
+use atomesh::mesh::{Mesh, PolyMesh, Regions, Tags};
 use atomesh::run::Outcome;
 use atomesh::watch::Phase;
-use atomesh_draw::Style;
+use atomesh_draw::{FlowCells, Picture, SpacePicture, Style};
 use atomesh_io::mesh::cells::{CellData, NO_CELL};
 use atomesh_io::mesh::{MeshData, MeshFormat, Provenance, Sections, World};
 
@@ -19,9 +19,11 @@ use crate::dimension::Dimension;
 use crate::error::JobError;
 use crate::files::write_bytes;
 use crate::images::is_z_up;
-use crate::options::{Backdrop, RunConfig};
+use crate::in_space::{draw_in_space, sheets};
+use crate::options::{Backdrop, RunConfig, View};
 use crate::sample::{Property, cell_fields};
 use crate::session::Session;
+use crate::surfaces::feature_groups;
 
 /// Facets that were tagged as features.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -76,17 +78,62 @@ impl<const D: usize> Writing<'_, D> {
     fn draw(&self, image: &Image<D>, session: &mut Session<'_>) -> Result<(), JobError> {
         let style = self.style();
         if let Some(file) = &self.outputs.picture {
-            let picture = match self.outcome.sample_cells() {
-                Some(cells) => (self.dimension.drawing.cells)(image, &cells, &style),
-                None => (self.dimension.drawing.mesh)(image, &self.outcome.sample_mesh(), &style),
+            let picture = match (self.outputs.view, self.outcome.sample_cells()) {
+                (View::Slices, Some(cells)) => {
+                    (self.dimension.drawing.cells)(image, &cells, &style)
+                        .map_err(JobError::content)?
+                }
+                (View::Slices, None) => {
+                    (self.dimension.drawing.mesh)(image, &self.outcome.sample_mesh(), &style)
+                        .map_err(JobError::content)?
+                }
+                (view, cells) => self.in_space(view, cells.as_ref(), image, session)?,
             };
-            file.write(&picture.map_err(JobError::content)?)?;
+            file.write(&picture)?;
         }
         if let (Some(path), Some(recording)) = (&self.outputs.movie, self.recording) {
             let movie = recording.encoded(self.outcome, image, &style, self.dimension, session)?;
             write_bytes(path, &movie)?;
         }
         Ok(())
+    }
+
+    /// The mesh in space: of Voronoi cells the features, of others all tagged facets but the box's sides.
+    fn in_space(
+        &self,
+        view: View,
+        cells: Option<&PolyMesh<D>>,
+        image: &Image<D>,
+        session: &mut Session<'_>,
+    ) -> Result<Picture, JobError> {
+        let mesh = self.outcome.sample_mesh();
+        let (groups, regions) = match cells {
+            Some(cells) => {
+                let features = self.outcome.cell_features().unwrap_or_default();
+                (feature_groups(cells, &features), None)
+            }
+            None => {
+                let (tags, _) = self.tags(&self.outcome.world_mesh(), session)?;
+                (tags.facet_groups().to_vec(), tags.regions().cloned())
+            }
+        };
+        let parts = regions.map(|regions| regions.of_cells).unwrap_or_default();
+        let sheets = sheets(groups, view);
+        if sheets.is_empty() && view == View::Space {
+            let text = "no facets are tagged: the picture shows slices alone";
+            session.warn(self.outputs.picture.as_ref().map(|file| file.path.as_path()), text);
+        }
+        let contents = SpacePicture {
+            cells: match cells {
+                Some(cells) => FlowCells::Polytopes(cells),
+                None => FlowCells::Simplices(&mesh),
+            },
+            image: Some(image),
+            sheets: &sheets,
+            parts: &parts,
+            cells_cut_away: view == View::CutAway,
+        };
+        draw_in_space(&contents, &self.style(), self.dimension)
     }
 
     /// How the mesh is drawn.

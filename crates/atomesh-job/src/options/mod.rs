@@ -17,7 +17,7 @@ pub use frame::{FrameOptions, RawOrder, axes};
 pub use input::InputOptions;
 pub use lattice::LatticeOptions;
 pub use optimize::{ImprovementOptions, OptimizerOptions, RegionOptions};
-pub use output::{Backdrop, OutputOptions};
+pub use output::{Backdrop, OutputOptions, View};
 
 use std::path::Path;
 

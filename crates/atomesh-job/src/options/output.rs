@@ -7,6 +7,7 @@ use serde::{Deserialize, Serialize};
 use atomesh_io::mesh::SectionKind;
 
 use super::section::section;
+use crate::error::JobError;
 use crate::values::{MaterialSpec, Text};
 #[cfg(feature = "clap")]
 use crate::values::{named, number_in};
@@ -24,6 +25,36 @@ pub enum Backdrop {
     Distance,
     /// The density of features.
     Density,
+}
+
+/// How a picture of a volume shows it.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(rename_all = "kebab-case")]
+pub enum View {
+    /// Three slices through the middle, and where they are in space.
+    #[default]
+    Slices,
+    /// Slices and surfaces in space.
+    #[serde(rename = "3d")]
+    Space,
+    /// Cells in space, an eighth of them cut away.
+    CutAway,
+}
+
+impl View {
+    /// Refuses views in space of what is flat.
+    ///
+    /// # Errors
+    /// [`JobError`] says what `--view` is for.
+    pub(crate) fn check_dimension(self, dimension: usize) -> Result<(), JobError> {
+        match (self, dimension) {
+            (Self::Slices, _) | (_, 3) => Ok(()),
+            _ => {
+                let message = "--view is for pictures of volumes, and this image is flat";
+                Err(JobError::misuse(message).advise("leave --view out"))
+            }
+        }
+    }
 }
 
 section! {
@@ -77,6 +108,10 @@ section! {
         #[arg(long, value_name = "WHAT",
             value_parser = named::<Backdrop>(&["image", "potential", "distance", "density"]))]
         pub picture_of: Backdrop,
+        /// What the picture of a volume shows: three slices; 3d, in space, slices and the surfaces of features, labels or
+        /// the mask; or cut-away, in space, the cells, an eighth of them cut away. Needs --picture. Default: slices
+        #[arg(long, value_name = "VIEW", value_parser = named::<View>(&["slices", "3d", "cut-away"]))]
+        pub view: View,
         /// Movie of the run, an animated .png: atoms on their way to the features over what --picture-of names, at most 100
         /// steps, and at last the mesh; sides of up to 640 pixels. In 3-D, the atoms within half an edge length of the three
         /// slices through the middle, up to 900 pixels
