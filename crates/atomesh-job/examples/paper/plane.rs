@@ -19,6 +19,8 @@ const IMAGE: &str = "hale2001-fig1-faults.png";
 
 /// Figures 5 to 7: nominal distances of 6 to 18, β = 0.3.
 const GRADED: &str = "--size 6..18 --beta 0.3";
+/// The same in the paper's own way: what atoms feel is p(x) alone, and none is put on a feature beforehand.
+const PAPERS: &str = "--size 6..18 --beta 0.3 --align off";
 
 pub fn fault_image(book: &Book) -> Result<Image<2>, Failure> {
     book.flat(IMAGE, Scene::Faults, [256, 256])
@@ -50,7 +52,7 @@ pub fn faults(book: &mut Book) -> Result<(), Failure> {
 /// Figures 5 to 7: d(x) with its lattice, and p(x) before and after the atoms have moved.
 pub fn lattice(book: &mut Book) -> Result<(), Failure> {
     let image = fault_image(book)?;
-    let options = run(GRADED)?.mesh_options::<2>()?;
+    let options = run(PAPERS)?.mesh_options::<2>()?;
     let dimension = Dimension::plane();
     let prepared = prepare(&dimension.method, Inputs::image(&image), options, &mut Silent)?;
     let filled = prepared.fill(&mut Silent)?;
@@ -81,7 +83,7 @@ pub fn lattice(book: &mut Book) -> Result<(), Failure> {
     book.add(
         "figure-6",
         "The total potential field p(x) of the initial lattice",
-        GRADED,
+        PAPERS,
         &picture,
         &checked,
     )?;
@@ -98,7 +100,7 @@ pub fn lattice(book: &mut Book) -> Result<(), Failure> {
     book.add(
         "figure-7",
         "The same when the atoms have moved into valleys",
-        GRADED,
+        PAPERS,
         &picture,
         &checked,
     )

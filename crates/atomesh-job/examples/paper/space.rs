@@ -47,15 +47,22 @@ fn slices(book: &mut Book, image: &Image<3>, outcome: &Outcome<3>) -> Result<(),
     book.add("figure-9", caption, OPTIONS, &picture, &checked)
 }
 
-/// The largest surface that is steep and the largest that is not, of those that the mesh follows.
+/// The largest surface that is steep and the largest that is not, of those that the mesh follows; one without folds, as
+/// horizons near each other are found as one.
 fn surfaces(book: &mut Book, image: &Image<3>, outcome: &Outcome<3>) -> Result<(), Failure> {
     let mesh = outcome.sample_mesh();
     let tags = outcome.tags()?;
     let groups = tags.facet_groups().iter().filter(|group| is_feature_name(&group.name));
     let areas: Vec<(&FacetGroup<3>, Point<3>)> =
         groups.map(|group| (group, areas_by_axis(&mesh, group))).collect();
+    // of the box, as it is seen along each axis
+    let [x, y, z] = image.frame().shape().map(|n| n as f64);
+    let sides = [y * z, z * x, x * y];
     let largest = |name: &str, is_steep: bool| {
-        let of_kind = areas.iter().filter(|(_, [x, y, z])| (x.hypot(*y) > *z) == is_steep);
+        let of_kind = areas.iter().filter(|(_, seen)| {
+            let [x, y, z] = *seen;
+            (x.hypot(y) > z) == is_steep && (0..3).all(|k| seen[k] <= sides[k])
+        });
         let area = |[x, y, z]: &Point<3>| x.hypot(*y).hypot(*z);
         let found = of_kind.max_by(|a, b| area(&a.1).total_cmp(&area(&b.1)));
         let facets = found.map(|(group, _)| group.facets.clone());
