@@ -639,7 +639,7 @@ impl Mesh {
     ///     cells: .vtu or polyMesh.
     /// **options
     ///     As the command's: `order` (2: cells of second order), `msh`, `msh_text`, `tag_features`, `regions`,
-    ///     `connections`, `picture`, `picture_of`, `report`, `html`, `write_potential`. See `atomesh.OutputOptions`.
+    ///     `connections`, `picture`, `picture_of`, `view`, `report`, `html`, `write_potential`. See `atomesh.OutputOptions`.
     ///
     /// Raises
     /// ------

@@ -541,6 +541,9 @@ class OutputOptions(WorkOptions, total=False):
     picture_of : Literal["image", "potential", "distance", "density"]
         What the picture shows behind the mesh: the image, the potential, the nominal distance, or the density of
         features, smoothed over the greatest nominal distance. Needs `picture` or `movie`. Default: image.
+    view : Literal["slices", "3d", "cut-away"]
+        What the picture of a volume shows: three slices; 3d, in space, slices and the surfaces of features, labels or
+        the mask; or cut-away, in space, the cells, an eighth of them cut away. Needs `picture`. Default: slices.
     movie : PathLike
         Movie of the run, an animated .png: atoms on their way to the features over what `picture_of` names, at most
         100 steps, and at last the mesh; sides of up to 640 pixels. In 3-D, the atoms within half an edge length of
@@ -564,6 +567,7 @@ class OutputOptions(WorkOptions, total=False):
     connections: PathLike
     picture: PathLike
     picture_of: Literal["image", "potential", "distance", "density"]
+    view: Literal["slices", "3d", "cut-away"]
     movie: PathLike
     report: PathLike
     html: PathLike
