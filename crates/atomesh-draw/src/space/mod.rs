@@ -27,8 +27,12 @@ const LONGEST: f64 = 1200.0;
 /// The share of the light that comes from everywhere; the rest depends on how a facet faces the eye.
 const AMBIENT: f64 = 0.45;
 
-/// The light on an edge, over that on its facet.
+/// The light on an edge, over that on its facet; on dark facets edges are lighter by so much instead.
 const EDGE: f64 = 0.6;
+const LIGHTER: u8 = 60;
+
+/// The brightest colour of a facet on which edges are lighter.
+const DARK: u8 = 80;
 
 /// Where slices lie between the side of the box that is nearest to the eye and the farthest one.
 const SLICES: f64 = 0.7;
@@ -75,7 +79,7 @@ impl<const D: usize> SpacePicture<'_, D> {
 /// Draws slices of an image in space with surfaces before them; or the cells of a mesh, an eighth of them cut away, in the
 /// greys of the image or the colours of their parts.
 ///
-/// [`Style::edges`] are those of facets, darker than these. The picture has [`Style::max_side`] pixels or 1200, whichever
+/// [`Style::edges`] are those of facets, darker than these, or lighter on dark ones. The picture has [`Style::max_side`] pixels or 1200, whichever
 /// is less, along its longer side. Cost: O(pixels + cells + facets).
 ///
 /// # Errors
@@ -180,7 +184,8 @@ impl<'a> Scene<'a> {
 
     /// The edges of a facet of a colour, those asked for.
     fn outline(&self, color: Color, edges: [bool; 3]) -> Option<Outline> {
-        let color = lit(color, EDGE);
+        let is_dark = color.iter().all(|&c| c < DARK);
+        let color = if is_dark { color.map(|c| c + LIGHTER) } else { lit(color, EDGE) };
         self.style.edges.then_some(Outline { edges, width: self.style.edge_width, color })
     }
 
@@ -202,7 +207,8 @@ impl<'a> Scene<'a> {
         if self.contents.image.is_none() {
             return;
         }
-        let at = self.between(SLICES);
+        // through the middles of samples, where it is plain which one is shown
+        let at = self.between(SLICES).map(f64::round);
         for normal in 0..3 {
             let (right, down) = ((normal + 1) % 3, (normal + 2) % 3);
             let corner = |i: usize, j: usize| -> Point<3> {
