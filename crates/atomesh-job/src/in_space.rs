@@ -5,16 +5,15 @@ use atomesh_draw::{Picture, Sheet, SpacePicture, Style};
 
 use crate::dimension::Dimension;
 use crate::error::JobError;
-use crate::options::View;
 
 /// The groups of facets that are shown as surfaces: all but the sides of the box; and the outline of a mask only if there is
-/// no other, which it would hide, and no cells fill it.
-pub(crate) fn sheets<const D: usize>(groups: Vec<FacetGroup<D>>, view: View) -> Vec<Sheet<D>> {
+/// no other, which it would hide.
+pub(crate) fn sheets<const D: usize>(groups: Vec<FacetGroup<D>>) -> Vec<Sheet<D>> {
     let is_side = |name: &str| (0..2 * D).any(|side| side_name(side) == name);
     let shown =
         groups.into_iter().filter(|group| !group.facets.is_empty() && !is_side(&group.name));
     let (masks, others): (Vec<_>, Vec<_>) = shown.partition(|group| group.name == MASK_NAME);
-    let shown = if others.is_empty() && view == View::Space { masks } else { others };
+    let shown = if others.is_empty() { masks } else { others };
     shown.into_iter().map(|FacetGroup { name, facets, .. }| Sheet { name, facets }).collect()
 }
 

@@ -118,7 +118,8 @@ impl<const D: usize> Writing<'_, D> {
             }
         };
         let parts = regions.map(|regions| regions.of_cells).unwrap_or_default();
-        let sheets = sheets(groups, view);
+        // surfaces would hide where cells are cut
+        let sheets = if view == View::Space { sheets(groups) } else { Vec::new() };
         if sheets.is_empty() && view == View::Space {
             let text = "no facets are tagged: the picture shows slices alone";
             session.warn(self.outputs.picture.as_ref().map(|file| file.path.as_path()), text);
