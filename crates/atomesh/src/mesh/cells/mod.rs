@@ -8,7 +8,11 @@
 //!    cells of these alone, as the triangulation is unique, its ties broken by coordinates.
 //! 3. The hole's *rim*, the facets between the hole and cells that stay, tells which of the new cells lie in it.
 //!
+//! Where many atoms move a little, most cells stay Delaunay's, and the hole is found otherwise (`mend`).
+//!
 //! Cost: O(cells of the hole), whatever the mesh's size.
+
+mod mend;
 
 use std::collections::HashMap;
 
@@ -45,6 +49,8 @@ pub(crate) struct Cells<const D: usize> {
     last: u32,
     seen: Marks,
     in_hole: Marks,
+    /// Which of the edits at hand moves each atom; `NONE` between calls.
+    edit_of: Vec<u32>,
 }
 
 impl<const D: usize> Cells<D> {
@@ -61,6 +67,7 @@ impl<const D: usize> Cells<D> {
             last: 0,
             seen: Marks::default(),
             in_hole: Marks::default(),
+            edit_of: Vec::new(),
         };
         for facet in mesh.facets() {
             if let Some(neighbour) = facet.neighbour {
@@ -130,29 +137,29 @@ impl<const D: usize> Cells<D> {
         points: &[Point<D>],
         edits: &[AtomEdit<D>],
     ) -> Result<CellChanges, ConnectError> {
+        if let Some(changes) = self.mend(delaunay, points, edits)? {
+            return Ok(changes);
+        }
         let hole = self.hole(points, edits);
         let rim = self.rim(&hole);
         let (atoms, places) = self.atoms_within(&hole, points, edits);
-        let mesh = match delaunay.connect(&places, &mut Silent) {
-            Ok(mesh) => mesh,
-            Err(ConnectError::Duplicate { first, second }) => {
-                let [first, second] = [first, second].map(|at| atoms[at] as usize);
-                return Err(ConnectError::Duplicate { first, second });
-            }
-            Err(error) => return Err(error),
-        };
-        let filling = Filling::new(&mesh, atoms, &rim);
-        let removed = hole.iter().flat_map(|&cell| self.corners(cell)).copied().collect();
-        for &cell in &hole {
-            self.is_cell[cell as usize] = false;
-            self.free.push(cell);
-        }
+        let filling = Filling::of_atoms(delaunay, atoms, &places, &rim)?;
         self.at_atom.resize(points.len(), NONE);
         for edit in edits.iter().filter(|edit| edit.to.is_none()) {
             self.at_atom[edit.atom as usize] = NONE;
         }
-        self.fill(&filling, &rim);
-        Ok(CellChanges::between(removed, filling.added(), Self::CORNERS))
+        Ok(self.refill(&hole, &rim, &filling))
+    }
+
+    /// Puts a filling in place of a hole; what has changed.
+    fn refill(&mut self, hole: &[u32], rim: &Rim<D>, filling: &Filling<D>) -> CellChanges {
+        let removed = hole.iter().flat_map(|&cell| self.corners(cell)).copied().collect();
+        for &cell in hole {
+            self.is_cell[cell as usize] = false;
+            self.free.push(cell);
+        }
+        self.fill(filling, rim);
+        CellChanges::between(removed, filling.added(), Self::CORNERS)
     }
 
     /// The cells that may go, ascending.
@@ -310,6 +317,26 @@ struct Filling<const D: usize> {
 }
 
 impl<const D: usize> Filling<D> {
+    /// Connects the atoms of a hole, which are at these places.
+    ///
+    /// # Errors
+    /// As [`Cells::follow`].
+    fn of_atoms(
+        delaunay: &Delaunay<D>,
+        atoms: Vec<u32>,
+        places: &[Point<D>],
+        rim: &Rim<D>,
+    ) -> Result<Self, ConnectError> {
+        match delaunay.connect(places, &mut Silent) {
+            Ok(mesh) => Ok(Self::new(&mesh, atoms, rim)),
+            Err(ConnectError::Duplicate { first, second }) => {
+                let [first, second] = [first, second].map(|at| atoms[at] as usize);
+                Err(ConnectError::Duplicate { first, second })
+            }
+            Err(error) => Err(error),
+        }
+    }
+
     /// The cells of a mesh of `atoms`; all lie in the hole if it has no rim.
     fn new(mesh: &Mesh<D>, atoms: Vec<u32>, rim: &Rim<D>) -> Self {
         let inside = vec![rim.is_empty(); mesh.cell_count()];
