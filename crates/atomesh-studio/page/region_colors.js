@@ -25,6 +25,17 @@ export function drawRegions(drawing, areas, box) {
   for (const { region, corners } of areas.groups) {
     drawing.triangles(`region ${region}`, areas.places, corners, box, [...colorOf(region).map((c) => c / 255), 0.4]);
   }
-  drawing.edges("parts", areas.places, areas.parts, box, [1, 1, 1, 0.9]);
+  // dark beside white, to be seen on any image
+  areas.lines ??= segmentsOf(areas.places, areas.parts);
+  drawing.segments("shade", areas.lines.ends, areas.lines.dark, box, 3.5);
+  drawing.segments("parts", areas.lines.ends, areas.lines.white, box, 1.5);
   drawing.edges("borders", areas.places, areas.borders, box, [1, 0.95, 0.4, 1]);
+}
+
+/** Edges as segments. */
+function segmentsOf(places, edges) {
+  const ends = new Uint16Array(2 * edges.length);
+  edges.forEach((place, i) => ends.set(places.subarray(2 * place, 2 * place + 2), 2 * i));
+  const filled = (color) => Uint8Array.from({ length: 2 * edges.length }, (_, i) => color[i % 4]);
+  return { ends, dark: filled([20, 24, 32, 200]), white: filled([255, 255, 255, 255]) };
 }
