@@ -55,6 +55,7 @@ fn a_made_mesh_is_looked_at_as_its_file_is_read() {
             image: Some(&image),
             world: &world,
             properties: &properties,
+            regions: None,
         };
         made.write(&plane, &mut session).unwrap();
         match read(run.output.output.as_ref().unwrap(), &mut session).unwrap() {
@@ -92,6 +93,7 @@ fn without_an_image_pictures_and_reports_are_refused() {
         image: None,
         world: &World::default(),
         properties: &[],
+        regions: None,
     };
     assert!(made.report(&plane, &mut session).is_err());
     let refused = made.write(&plane, &mut session).unwrap_err();

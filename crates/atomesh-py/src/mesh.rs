@@ -54,7 +54,7 @@ impl<const D: usize> Made<D> {
     /// The mesh as jobs take it.
     pub fn as_job<'a>(&'a self, run: &'a RunConfig, properties: &'a [Property]) -> MadeMesh<'a, D> {
         let Self { outcome, image, world, .. } = self;
-        MadeMesh { run, outcome, image: Some(image), world, properties }
+        MadeMesh { run, outcome, image: Some(image), world, properties, regions: None }
     }
 
     /// The mesh of either kind, for Python.

@@ -90,7 +90,9 @@ const FRAGMENT = {
  */
 export function linked(gl, vertex, fragment) {
   const program = gl.createProgram();
-  for (const [kind, source] of [[gl.VERTEX_SHADER, vertex], [gl.FRAGMENT_SHADER, fragment]]) {
+  /** @type {[number, string][]} */
+  const shaders = [[gl.VERTEX_SHADER, vertex], [gl.FRAGMENT_SHADER, fragment]];
+  for (const [kind, source] of shaders) {
     const shader = gl.createShader(kind);
     gl.shaderSource(shader, source);
     gl.compileShader(shader);
@@ -235,6 +237,26 @@ export class Drawing {
     this.places(`${name} places`, places);
     this.buffer(`${name} edges`, gl.ELEMENT_ARRAY_BUFFER, edges);
     gl.drawElements(gl.LINES, edges.length, gl.UNSIGNED_INT, 0);
+  }
+
+  /**
+   * Fills triangles between places.
+   * @param {string} name
+   * @param {Uint16Array | Float32Array} places
+   * @param {Uint32Array} corners three places each
+   * @param {{scale: number[], shift: number[]}} to
+   * @param {number[]} ink
+   */
+  triangles(name, places, corners, to, ink) {
+    if (corners.length === 0) return;
+    const { gl } = this;
+    const { program, at } = this.programs.lines;
+    this.array();
+    this.use(program, at, to);
+    gl.uniform4fv(at("ink"), ink);
+    this.places(`${name} places`, places);
+    this.buffer(`${name} corners`, gl.ELEMENT_ARRAY_BUFFER, corners);
+    gl.drawElements(gl.TRIANGLES, corners.length, gl.UNSIGNED_INT, 0);
   }
 
   places(name, places) {

@@ -68,6 +68,33 @@ export function readSlice(buffer) {
 }
 
 /**
+ * Regions and parts, as region_view.rs lays them out. `corners` of a group are those of its triangles.
+ * @param {ArrayBuffer} buffer
+ */
+export function readRegions(buffer) {
+  const [places, triangles, parts, borders, count] = new Uint32Array(buffer, 0, 8);
+  let at = 32;
+  const u32 = (length) => {
+    const numbers = new Uint32Array(buffer, at, length);
+    at += 4 * length;
+    return numbers;
+  };
+  const shown = { places: new Uint16Array(buffer, at, 2 * places), parts: null, borders: null, groups: [] };
+  at += 4 * places;
+  const corners = u32(3 * triangles);
+  shown.parts = u32(2 * parts);
+  shown.borders = u32(2 * borders);
+  const groups = u32(2 * count);
+  let start = 0;
+  for (let i = 0; i < count; i++) {
+    const end = start + 3 * groups[2 * i + 1];
+    shown.groups.push({ region: groups[2 * i], corners: corners.subarray(start, end) });
+    start = end;
+  }
+  return shown;
+}
+
+/**
  * The recorded iterations.
  * @param {ArrayBuffer} buffer
  */

@@ -4,8 +4,8 @@
 
 /** @type {Key[]} */
 export const KEYS = [
-  ...["look", "paint size", "paint weight", "atoms", "", "facets", "wells"].flatMap((name, i) =>
-    name ? [{ key: String(i + 1), does: `tool: ${name}`, act: (app) => app.choose(i + 1) }] : []),
+  ...["look", "paint size", "paint weight", "atoms", "regions", "facets", "wells"].flatMap((name, i) =>
+    [{ key: String(i + 1), does: `tool: ${name}`, act: (app) => app.choose(i + 1) }]),
   { key: "r", does: "show the whole image", act: (app) => app.resetViews() },
   { key: "c", does: "contrast from the image", act: (app) => app.autoContrast() },
   { key: "g", does: "mesh on or off", act: (app) => app.toggleMesh() },
@@ -20,6 +20,8 @@ export const KEYS = [
   { key: "N", shown: "Shift + n", does: "wells: a sink under the pointer", act: (app) => app.tool.add?.(true) },
   { key: "Delete", does: "remove the atom or well under the pointer", act: (app) => app.tool.remove?.() },
   { key: "f", does: "atoms: pin the one under the pointer, or let it go", act: (app) => app.tool.pin?.() },
+  { key: "m", does: "regions: the next strokes merge parts, or paint again", act: (app) => app.tool.setHand?.("merge") },
+  { key: "s", does: "regions: two strokes split a part between them, or paint again", act: (app) => app.tool.setHand?.("split") },
   { key: "Ctrl+z", does: "undo", act: (app) => app.undo() },
   { key: "Ctrl+Z", shown: "Ctrl + Shift + z", does: "redo", act: (app) => app.redo() },
   { key: "Ctrl+y", does: "redo", act: (app) => app.redo() },
@@ -35,8 +37,9 @@ export const HANDS = [
   { key: "middle drag, Space + drag", does: "move the image" },
   { key: "right drag", does: "window (sideways) and level (up and down)" },
   { key: "Shift + move", does: "crosshair, in 3-D" },
-  { key: "drag", does: "paint; move an atom or a well; otherwise move the image" },
-  { key: "Ctrl + drag", does: "paint: erase to automatic" },
+  { key: "drag", does: "paint size, weight or regions; move an atom or a well; otherwise move the image" },
+  { key: "Ctrl + drag", does: "paint: erase to automatic; regions: erase to none" },
+  { key: "Shift + drag", does: "regions: paint single cells" },
   { key: "click", does: "facets: close or open one; with Shift its whole feature" },
 ];
 

@@ -9,6 +9,7 @@ import { Atoms } from "./tool_atoms.js";
 import { Facets } from "./tool_facets.js";
 import { Look } from "./tool_look.js";
 import { Paint } from "./tool_paint.js";
+import { Regions } from "./tool_regions.js";
 import { Wells } from "./tool_wells.js";
 import { Space } from "./space.js";
 import { View } from "./view.js";
@@ -27,10 +28,12 @@ class App {
     this.showsMesh = true;
     this.played = null;
     this.imageNumber = 0;
+    /** @type {Record<number, any>} the tools by their numbers; each has what it needs of down, move, up, draw, enter, leave … */
     this.tools = {
       1: new Look(this), 2: new Paint(this, "size"), 3: new Paint(this, "weight"),
-      4: new Atoms(this), 6: new Facets(this), 7: new Wells(this),
+      4: new Atoms(this), 5: new Regions(this), 6: new Facets(this), 7: new Wells(this),
     };
+    /** @type {any} */
     this.tool = this.tools[1];
     this.playback = new Playback(this);
     this.panel = new Panel(this);
@@ -71,7 +74,7 @@ class App {
   markTool() {
     [...document.getElementById("tools").children].forEach((button, i) => {
       button.setAttribute("aria-pressed", String(this.tools[i + 1] === this.tool));
-      if (this.tools[i + 1]) /** @type {HTMLButtonElement} */ (button).disabled = this.dimension === 3 && i + 1 > 4;
+      if (this.tools[i + 1]) /** @type {HTMLButtonElement} */ (button).disabled = this.dimension === 3 && i + 1 > 5;
     });
   }
 
@@ -139,7 +142,7 @@ class App {
     document.body.classList.toggle("down", !up);
     if (up) {
       this.wasUp = true;
-      if (this.tool.showsAtoms) this.tool.enter();
+      if (this.tool.showsAtoms || this.tool.paintsRegions) this.tool.enter();
     } else if (this.wasUp) {
       this.say("The studio has ended or cannot be reached; it is tried again.");
     }
@@ -157,7 +160,7 @@ class App {
     bar.hidden = document.getElementById("cancel").hidden = !busy;
     bar.value = this.progress?.done ?? 0;
     this.playback.update(model?.recorded ?? 0, this.revision);
-    if (model && this.tool.radius === 0) this.tool.enter();
+    if (model && (this.tool.radius === 0 || (this.tool.brush === 0 && this.distance))) this.tool.enter();
     this.panel.update();
     document.body.dataset.revision = String(this.revision);
     document.body.dataset.busy = String(busy);
@@ -179,7 +182,7 @@ class App {
 
   choose(number) {
     const tool = this.tools[number];
-    if (!tool || tool === this.tool || (this.dimension === 3 && number > 4)) return;
+    if (!tool || tool === this.tool || (this.dimension === 3 && number > 5)) return;
     this.tool.leave?.();
     this.tool = tool;
     tool.enter?.();

@@ -1,5 +1,7 @@
 // The right side: controls of every stage, and its figures. Text is only ever set as text.
 
+import { styleOf } from "./region_colors.js";
+
 const KINDS = ["dark", "bright", "edges", "ridges", "horizons", "faults", "labels", "none"];
 const WITH_THRESHOLD = ["ridges", "horizons", "faults"];
 const FORMATS = ["vtu", "vtk", "msh", "msh2", "npz", "inp"];
@@ -66,6 +68,8 @@ export class Panel {
     this.section("Mesh",
       this.select("cells", "cells", ["delaunay", "voronoi"], (kind) => set("lattice.mesh", kind)),
       this.meshFigures);
+    this.legend = make("dl", { id: "legend" });
+    this.section("Regions", this.legend);
     this.section("Flow", this.flowFigures);
     this.command = make("code", { id: "command", hidden: true });
     const format = make("select", { id: "format" });
@@ -174,6 +178,7 @@ export class Panel {
       ]),
       ["features followed", share(figures.recall)],
     ] : []);
+    this.updateLegend(model);
     const flow = model.flow;
     const rates = flow ? flow.rates.map((rate, i) => [`${model.wells[i]?.kind ?? "well"} ${i + 1}`, rate.toPrecision(3)]) : [];
     table(this.flowFigures, [
@@ -182,6 +187,18 @@ export class Panel {
       ...(flow && flow.imbalance !== null ? [["imbalance", flow.imbalance.toExponential(1)]] : []),
       ...(flow ? flow.notes.map((note) => ["", note]) : []),
     ]);
+  }
+
+  /** Each region: its colour and name, area or volume in the world's units, cells. */
+  updateLegend(model) {
+    this.legend.parentElement.hidden = model.regions.length === 0;
+    const unit = model.units[0] ? ` ${model.units[0]}${model.dimension === 2 ? "²" : "³"}` : "";
+    this.legend.replaceChildren(...model.regions.flatMap(({ region, name, cells, measure }) => {
+      const mark = make("span", { className: "mark" });
+      mark.style.backgroundColor = styleOf(region);
+      return [make("dt", {}, mark, name),
+        make("dd", { textContent: `${short(measure)}${unit} · ${cells.toLocaleString("en")} cells` })];
+    }));
   }
 
   updateTool() {
@@ -201,7 +218,8 @@ export class Panel {
       value.onchange = () => (tool.multiplier = Number(value.value));
       rows.push(make("label", {}, make("span", { textContent: "lets through" }), value, make("output")));
     }
-    if (this.tool.contains(document.activeElement)) return;
+    if (this.tool.contains(document.activeElement) && document.activeElement.tagName !== "BUTTON") return;
+    if (tool.controls) rows.push(...tool.controls(make));
     this.tool.replaceChildren(...rows);
     this.tool.parentElement.hidden = rows.length === 0;
   }

@@ -1,6 +1,7 @@
 // The view in space: the three slices where they are, and the surfaces of features. Dragging turns it.
 
 import { linked } from "./draw.js";
+import { colorOf } from "./region_colors.js";
 
 const VERTEX = `#version 300 es
   uniform mat3 turn;
@@ -35,7 +36,8 @@ const FRAGMENT = `#version 300 es
     color = vec4(tint.rgb * (0.45 + 0.55 * abs(normal.z)), 1);
   }`;
 
-const COLORS = [[255, 120, 90], [110, 200, 120], [120, 160, 255], [240, 200, 90], [200, 120, 230], [90, 210, 220]];
+/** Added to the number of a region, among those of features. */
+const REGION = 1 << 15;
 
 export class Space {
   /**
@@ -47,7 +49,7 @@ export class Space {
     this.box = document.createElement("div");
     this.box.className = "view";
     this.canvas = document.createElement("canvas");
-    this.canvas.setAttribute("aria-label", "the slices and the surfaces of features in space");
+    this.canvas.setAttribute("aria-label", "the slices and the surfaces of features and regions in space");
     this.label = document.createElement("span");
     this.label.className = "label";
     this.label.textContent = "drag to turn";
@@ -116,13 +118,18 @@ export class Space {
   }
 
   takeSurface(buffer) {
-    const [count] = new Uint32Array(buffer, 0, 1);
-    const numbers = new Uint16Array(buffer, 4, 10 * count);
+    const [all] = new Uint32Array(buffer, 0, 1);
+    let numbers = new Uint16Array(buffer, 4, 10 * all);
+    // regions are closed: features would be hidden by them, and hide them
+    const isRegion = (i) => numbers[10 * i + 9] >= REGION;
+    const regions = Array.from({ length: all }, (_, i) => i).filter(isRegion);
+    if (regions.length > 0) numbers = Uint16Array.from(regions.flatMap((i) => [...numbers.subarray(10 * i, 10 * i + 10)]));
+    const count = numbers.length / 10;
     const places = new Float32Array(9 * count);
     const colors = new Uint8Array(12 * count);
     for (let i = 0; i < count; i++) {
       for (let k = 0; k < 9; k++) places[9 * i + k] = numbers[10 * i + k] / 65535;
-      const color = COLORS[(numbers[10 * i + 9] + COLORS.length - 1) % COLORS.length];
+      const color = colorOf(numbers[10 * i + 9] % REGION);
       for (let k = 0; k < 3; k++) colors.set([...color, 255], 12 * i + 4 * k);
     }
     this.surface = { count, places, colors };

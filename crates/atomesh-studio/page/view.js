@@ -1,7 +1,8 @@
 // One view: a slice of the image with what lies over it, and the way from its pixels to samples and back.
 
 import { Drawing } from "./draw.js";
-import { readFrame, readSlice } from "./frames.js";
+import { readFrame, readRegions, readSlice } from "./frames.js";
+import { drawRegions } from "./region_colors.js";
 
 const NAMES = ["x", "y", "z"];
 const AXES = [[1, 2], [0, 2], [0, 1]];
@@ -31,6 +32,8 @@ export class View {
     this.zoom = 1;
     /** @type {any} */
     this.cells = null;
+    /** @type {any} */
+    this.regions = null;
     this.loaded = "";
     this.wanted = "";
     this.slices = {};
@@ -144,7 +147,7 @@ export class View {
     const at = app.dimension === 3 ? app.cross[axis] : 0;
     if (this.slider) this.slider.value = String(at);
     const overlay = app.overlay;
-    const wanted = `${app.imageNumber} ${app.state?.shown} ${at} ${overlay} ${app.wantsDistance}`;
+    const wanted = `${app.imageNumber} ${app.state?.shown} ${at} ${overlay} ${app.wantsDistance} ${app.state?.parts}`;
     if (wanted === this.wanted) return;
     this.wanted = wanted;
     const get = async (path) => {
@@ -176,6 +179,11 @@ export class View {
       if (this.wanted !== wanted) return;
       if (buffer) this.cells = readFrame(buffer);
     }
+    const regions = await get(`/view/regions?axis=${axis}&at=${at}`);
+    if (this.wanted !== wanted) return;
+    // the old ones stay while others are made
+    const isAwaited = app.model?.hasRegions || app.tool.paintsRegions;
+    if (regions || !isAwaited) this.regions = regions ? readRegions(regions) : null;
     app.redraw();
   }
 
@@ -201,6 +209,7 @@ export class View {
     }
     const mesh = app.dimension === 3 ? this.cells : app.frames.mesh;
     const isEditing = app.tool.showsAtoms && app.dimension === 2 && app.frames.atoms;
+    if (this.regions && !app.played) drawRegions(drawing, this.regions, box);
     if (app.played) {
       this.drawPlayed(box);
     } else if (app.showsMesh && mesh && !isEditing) {

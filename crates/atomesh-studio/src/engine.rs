@@ -1,6 +1,6 @@
 //! The engine: one thread that owns the session, does what pages ask for, and makes what is missing.
 //!
-//! Between requests it works towards a mesh of all that was done: the mesh first, then its figures, then barriers and flow.
+//! Between requests it works towards a mesh of all that was done: the mesh first, then regions, figures, barriers and flow.
 //! A request that changes anything ends the work under way at its next look; the newest counts. What is on the screen
 //! stays there until the new is made.
 
@@ -17,12 +17,13 @@ use atomesh_job::options::{InputOptions, RunConfig};
 use atomesh_job::{ErrorKind, JobError};
 use serde_json::Value;
 
-use crate::exhibit::{Exhibit, Shown};
+use crate::exhibit::{Exhibit, Shown, Surfaces};
 use crate::gesture::Gesture;
 use crate::hub::{Frame, Hub};
 use crate::log::Source;
 use crate::model::{AnyModel, Model, each, sha256};
 use crate::protocol::{Command, Kind};
+use crate::region_view;
 use crate::session::Session;
 use crate::view::{self, Dragged};
 use attention::Attention;
@@ -62,6 +63,10 @@ struct Engine {
     atoms_revision: u32,
     /// Whether pages show atoms.
     shows_atoms: bool,
+    /// The level of the parts that pages show, if they do.
+    level: Option<usize>,
+    /// The part of each cell at that level.
+    parts: Option<Arc<Vec<i32>>>,
     drag: Option<Drag>,
     made: Made,
     figures: Value,
@@ -76,6 +81,7 @@ struct Made {
     fields: bool,
     mesh: bool,
     atoms: bool,
+    regions: bool,
     figures: bool,
     flow: bool,
     /// Nothing more is made: it failed, or was ended by hand.
@@ -100,6 +106,8 @@ impl Engine {
             image: (0, 0),
             atoms_revision: 0,
             shows_atoms: false,
+            level: None,
+            parts: None,
             drag: None,
             made: Made::default(),
             figures: Value::Null,
@@ -127,8 +135,8 @@ impl Engine {
     }
 
     fn has_work(&self) -> bool {
-        let Made { mesh, atoms, figures, flow, halted, .. } = self.made;
-        let wanted = [mesh, atoms || !self.shows_atoms, figures, flow];
+        let Made { mesh, atoms, regions, figures, flow, halted, .. } = self.made;
+        let wanted = [mesh, atoms || !self.shows_atoms, regions, figures, flow];
         self.session.model().is_some() && !halted && self.drag.is_none() && wanted.contains(&false)
     }
 
@@ -176,6 +184,12 @@ impl Engine {
                 self.publish_state();
             }
             Command::Atoms { shown } => self.shows_atoms = shown,
+            Command::Parts { count } => {
+                if self.level != count {
+                    self.level = count;
+                    self.made.regions = false;
+                }
+            }
             Command::Scene { name, seed } => {
                 let source = Source::Scene { name, seed };
                 let run = RunConfig::default();
@@ -193,23 +207,26 @@ impl Engine {
     }
 
     fn act(&mut self, gesture: Gesture) -> Result<(), JobError> {
-        let keeps_mesh = matches!(
-            gesture,
+        let kept = match gesture {
             Gesture::Facet { .. }
-                | Gesture::Well { .. }
-                | Gesture::MoveWell { .. }
-                | Gesture::RemoveWell { .. }
-        );
+            | Gesture::Well { .. }
+            | Gesture::MoveWell { .. }
+            | Gesture::RemoveWell { .. } => Some(Made { flow: false, ..self.made }),
+            Gesture::Region { .. }
+            | Gesture::NameRegion { .. }
+            | Gesture::MergeParts { .. }
+            | Gesture::SplitPart { .. } => Some(Made { regions: false, ..self.made }),
+            _ => None,
+        };
         self.session.act(gesture, &mut self.attention.firm())?;
-        match keeps_mesh {
-            true => {
-                self.made.flow = false;
-                self.made.halted = false;
+        match kept {
+            Some(made) => {
+                self.made = Made { halted: false, ..made };
                 self.error = None;
                 self.revision += 1;
                 self.publish_state();
             }
-            false => self.changed(),
+            None => self.changed(),
         }
         Ok(())
     }
@@ -329,6 +346,12 @@ impl Engine {
             self.made.atoms = true;
             self.atoms_revision = revision;
             self.publish_state();
+        } else if !self.made.regions {
+            let level = self.level;
+            self.parts = each!(model, model => make_regions(model, level, watch))?;
+            self.made.regions = true;
+            self.exhibit();
+            self.publish_state();
         } else if !self.made.figures {
             self.figures = each!(model, model => state::figures(model, watch))?;
             self.made.figures = true;
@@ -345,9 +368,10 @@ impl Engine {
 
     fn exhibit(&mut self) {
         self.shown += 1;
+        let parts = self.parts.clone().filter(|_| self.made.regions);
         let shown: Option<Arc<dyn Exhibit>> = self.session.model().and_then(|model| match model {
-            AnyModel::Flat(model) => shown(model, self.revision),
-            AnyModel::Volume(model) => shown(model, self.revision),
+            AnyModel::Flat(model) => shown(model, self.revision, parts, |_, _| Vec::new()),
+            AnyModel::Volume(model) => shown(model, self.revision, parts, region_view::surfaces),
         });
         self.hub.exhibit(shown);
     }
@@ -360,6 +384,7 @@ impl Engine {
             atoms_revision: self.atoms_revision,
             is_busy: self.has_work(),
             has_atoms: self.made.atoms,
+            parts: self.parts.as_deref().filter(|_| self.made.regions).map(|parts| count_of(parts)),
             figures: &self.figures,
             hash: self.hash.as_deref().filter(|_| self.made.mesh),
             error: self.error.as_deref(),
@@ -411,7 +436,22 @@ fn make_flow<const D: usize>(
     Ok((view::facets(&flow, &grid, revision), view::flow(&flow, &grid, revision)))
 }
 
-fn shown<const D: usize>(model: &Model<D>, revision: u32) -> Option<Arc<dyn Exhibit>>
+/// The regions, and the parts of a level if one is shown.
+fn make_regions<const D: usize>(
+    model: &mut Model<D>,
+    level: Option<usize>,
+    watch: &mut dyn atomesh::watch::Watch,
+) -> Result<Option<Arc<Vec<i32>>>, JobError> {
+    model.on_mesh(watch)?;
+    level.map(|level| model.parts(level, watch).map(Arc::new)).transpose()
+}
+
+fn shown<const D: usize>(
+    model: &Model<D>,
+    revision: u32,
+    parts: Option<Arc<Vec<i32>>>,
+    surfaces: Surfaces<D>,
+) -> Option<Arc<dyn Exhibit>>
 where
     Shown<D>: Exhibit,
 {
@@ -423,11 +463,19 @@ where
         prepared: stages.prepared().cloned(),
         outcome: stages.outcome(),
         playback: stages.playback(),
+        regions: stages.regions(),
+        parts,
+        surfaces,
     }))
 }
 
 fn nothing_open() -> JobError {
     JobError::misuse("no image is open")
+}
+
+/// How many parts there are.
+fn count_of(parts: &[i32]) -> usize {
+    parts.iter().collect::<std::collections::BTreeSet<_>>().len()
 }
 
 /// What the user is told.

@@ -13,12 +13,16 @@ use atomesh::run::{Outcome, Prepared};
 
 use atomesh_job::mesh::MeshImages;
 
-use crate::model::Playback;
+use crate::model::{OnMesh, Playback};
 use crate::protocol::{Arrays, Kind, share};
+use crate::region_view::{Divisions, REGION, areas};
 use crate::slice_cells::slice_cells;
 
 /// Samples of the longest side of a slice: what textures of all browsers hold.
 const LONGEST: usize = 4096;
+
+/// The axes of a slice, by the axis normal to it.
+const AXES: [[usize; 2]; 3] = [[1, 2], [0, 2], [0, 1]];
 
 /// What a slice shows.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, serde::Deserialize)]
@@ -42,14 +46,22 @@ pub trait Exhibit: fmt::Debug + Send + Sync {
     /// The edges in which a plane through a sample cuts the cells, as a frame of [`Kind::Mesh`]; `None` in the plane.
     fn cells(&self, axis: usize, at: usize) -> Option<Vec<u8>>;
 
-    /// The surfaces of features in space: a u32, how many triangles, and for each of them three places as u16 and the number of
-    /// its feature, from 1; `None` if there are none.
+    /// The regions and the borders of parts, as [`areas`] has them: in the plane, or where a plane through a sample cuts the
+    /// cells; `None` if there are neither.
+    fn regions(&self, axis: usize, at: usize) -> Option<Vec<u8>>;
+
+    /// The surfaces of features and regions in space: a u32, how many triangles, and for each of them three places as u16 and
+    /// a number: of its feature, from 1, or of its region with [`REGION`](crate::region_view::REGION) added; `None` if there
+    /// are none.
     fn surface(&self) -> Option<Vec<u8>>;
 
     /// The recorded iterations: four u32 (frames, atoms, axes, iterations from frame to frame), for each frame two f32, the
     /// pairs' and the image's energy, then for each frame the places of all atoms as u16.
     fn playback(&self) -> Option<Vec<u8>>;
 }
+
+/// The triangles of regions' surfaces, with their numbers.
+pub type Surfaces<const D: usize> = fn(&Outcome<D>, &[i32]) -> Vec<(u16, [Point<D>; D])>;
 
 /// What a model shows.
 #[derive(Debug)]
@@ -66,6 +78,12 @@ pub struct Shown<const D: usize> {
     pub outcome: Option<Arc<Outcome<D>>>,
     /// The iterations.
     pub playback: Option<Arc<Playback>>,
+    /// The regions on the mesh, if there are any.
+    pub regions: Option<Arc<OnMesh>>,
+    /// The part of each cell, if they are shown.
+    pub parts: Option<Arc<Vec<i32>>>,
+    /// The surfaces of regions.
+    pub surfaces: Surfaces<D>,
 }
 
 impl<const D: usize> Exhibit for Shown<D> {
@@ -94,37 +112,53 @@ impl<const D: usize> Exhibit for Shown<D> {
             return None;
         }
         let outcome = self.outcome.as_ref()?;
-        let step = self.grid.step[axis];
-        // no cell lies before the first sample: just behind it
-        let level = (at.min(self.grid.shape[axis] - 1) as f64 * step).max(1e-6 * step);
-        let axes = [[1, 2], [0, 2], [0, 1]][axis];
         let (points, edges) = match outcome.cells() {
             Some(_) => return None,
-            None => slice_cells(outcome.mesh(), axis, level),
+            None => slice_cells(outcome.mesh(), axis, self.level(axis, at)),
         };
         let counts = [points.len(), edges.len() / 2];
         let mut arrays = Arrays::new(Kind::Mesh, D, self.revision, counts);
-        points.iter().for_each(|p: &Point<D>| arrays.place(p, &self.grid, axes));
+        points.iter().for_each(|p: &Point<D>| arrays.place(p, &self.grid, AXES[axis]));
         arrays.numbers(edges);
         Some(arrays.into_bytes())
     }
 
-    fn surface(&self) -> Option<Vec<u8>> {
-        let outcome =
-            self.outcome.as_ref().filter(|outcome| D == 3 && outcome.cells().is_none())?;
-        let tags = outcome.tags().ok()?;
-        let groups = tags.facet_groups().iter().filter(|group| is_feature_name(&group.name));
-        let facets: Vec<(u16, [u32; D])> = (groups.zip(1_u16..))
-            .flat_map(|(group, number)| group.facets.iter().map(move |facet| (number, *facet)))
-            .collect();
-        if facets.is_empty() {
+    fn regions(&self, axis: usize, at: usize) -> Option<Vec<u8>> {
+        let outcome = self.outcome.as_ref().filter(|_| axis < 3 && (D == 3 || axis == 2))?;
+        let regions: &[i32] = self.regions.as_ref().map_or(&[], |regions| &regions.of_cells);
+        let parts: &[i32] = self.parts.as_ref().map_or(&[], |parts| parts);
+        if regions.is_empty() && parts.is_empty() {
             return None;
         }
+        let cut = (D == 3).then(|| (axis, self.level(axis, at)));
+        let divisions = Divisions { regions, parts };
+        Some(areas(outcome, &divisions, cut, (&self.grid, AXES[axis])))
+    }
+
+    fn surface(&self) -> Option<Vec<u8>> {
+        let outcome = self.outcome.as_ref().filter(|_| D == 3)?;
         let points = outcome.mesh().points();
-        let mut bytes = (facets.len() as u32).to_le_bytes().to_vec();
-        for (number, facet) in facets {
-            for corner in facet {
-                let place = shares(&points[corner as usize], &self.grid);
+        let mut triangles: Vec<(u16, [Point<D>; D])> = Vec::new();
+        if outcome.cells().is_none() {
+            let tags = outcome.tags().ok()?;
+            let groups =
+                tags.facet_groups().iter().filter(|group| is_feature_name(&group.name));
+            for (group, number) in groups.zip(1_u16..REGION) {
+                let facets = group.facets.iter();
+                let facets = facets.map(|facet| facet.map(|corner| points[corner as usize]));
+                triangles.extend(facets.map(|facet| (number, facet)));
+            }
+        }
+        if let Some(regions) = &self.regions {
+            triangles.extend((self.surfaces)(outcome, &regions.of_cells));
+        }
+        if triangles.is_empty() {
+            return None;
+        }
+        let mut bytes = (triangles.len() as u32).to_le_bytes().to_vec();
+        for (number, corners) in triangles {
+            for corner in corners {
+                let place = shares(&corner, &self.grid);
                 bytes.extend(place.iter().flat_map(|share| share.to_le_bytes()));
             }
             bytes.extend(number.to_le_bytes());
@@ -147,6 +181,15 @@ impl<const D: usize> Exhibit for Shown<D> {
     }
 }
 
+impl<const D: usize> Shown<D> {
+    /// Where a plane through a sample cuts cells.
+    fn level(&self, axis: usize, at: usize) -> f64 {
+        let step = self.grid.step[axis];
+        // no cell lies before the first sample: just behind it
+        (at.min(self.grid.shape[axis] - 1) as f64 * step).max(1e-6 * step)
+    }
+}
+
 /// A place as shares of the box, 0…65535.
 fn shares<const D: usize>(p: &Point<D>, grid: &Grid<D>) -> [u16; D] {
     std::array::from_fn(|k| share(p[k], grid, k))
@@ -160,7 +203,7 @@ fn raw<const D: usize>(
     value: impl Fn(usize) -> f32,
 ) -> Option<Vec<u8>> {
     let of = |k: usize| shape.get(k).copied().unwrap_or(1);
-    let [columns, rows] = *[[1, 2], [0, 2], [0, 1]].get(axis)?;
+    let [columns, rows] = *AXES.get(axis)?;
     if D == 2 && axis != 2 {
         return None;
     }

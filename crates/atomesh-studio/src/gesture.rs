@@ -107,6 +107,40 @@ pub enum Gesture {
         /// Its number; those of later wells become one less.
         well: usize,
     },
+    /// Gives what a stroke touches a region.
+    Region {
+        /// The region's number, from 1; 0 takes cells out of any.
+        region: u32,
+        /// The brush's radius in lattice units: cells whose middles are nearer are touched, and all that the path passes.
+        radius: f64,
+        /// The path.
+        path: Vec<Vec<f64>>,
+        /// The level whose parts are touched; none: single cells.
+        parts: Option<usize>,
+    },
+    /// Names a region.
+    NameRegion {
+        /// Its number, from 1.
+        region: u32,
+        /// The name.
+        name: String,
+    },
+    /// Makes the parts along a stroke one.
+    MergeParts {
+        /// The stroke.
+        path: Vec<Vec<f64>>,
+        /// The level that is looked at.
+        parts: usize,
+    },
+    /// Cuts a part in two where the border between two strokes is weakest.
+    SplitPart {
+        /// The stroke on one side, which begins in the part.
+        first: Vec<Vec<f64>>,
+        /// The stroke on the other.
+        second: Vec<Vec<f64>>,
+        /// The level that is looked at.
+        parts: usize,
+    },
 }
 
 impl Gesture {
@@ -126,6 +160,12 @@ impl Gesture {
             Self::Remove { .. } | Self::Pin { .. } | Self::RemoveWell { .. } => return Ok(()),
             Self::Facet { at, multiplier, .. } => (vec![at], vec![*multiplier]),
             Self::MoveWell { to, .. } => (vec![to], Vec::new()),
+            Self::Region { radius, path, .. } => (path.iter().collect(), vec![*radius]),
+            Self::NameRegion { .. } => return Ok(()),
+            Self::MergeParts { path, .. } => (path.iter().collect(), Vec::new()),
+            Self::SplitPart { first, second, .. } => {
+                (first.iter().chain(second).collect(), Vec::new())
+            }
         };
         if places.len() > most {
             return Err(format!("a path of {} places; expected {most} or fewer", places.len()));

@@ -8,8 +8,8 @@
 //! - `engine`: one thread that owns the session; the newest request counts, work under way is ended by its watch.
 //! - [`session`], [`log`]: what was done, in order; undo, redo, and a log that survives a kill. [`replay`] makes of it the
 //!   bytes that the page exports.
-//! - `model`: an image, options, paint, edited atoms, barriers and wells, and the mesh made of them, stage by stage.
-//! - `view`, `exhibit`, `slice_cells`: what is seen of it, as frames and slices.
+//! - `model`: an image, options, paint, edited atoms, barriers, wells and regions, and the mesh made of them, stage by stage.
+//! - `view`, `exhibit`, `slice_cells`, `region_view`: what is seen of it, as frames and slices.
 //! - `page`: the page's files, plain modules without a build.
 //!
 //! ```no_run
@@ -39,6 +39,7 @@ pub mod log;
 mod model;
 mod page;
 pub mod protocol;
+mod region_view;
 pub mod replay;
 mod routes;
 pub mod security;

@@ -30,11 +30,13 @@ pub const ASSETS: &[Asset] = assets! {
     "view.js": "text/javascript; charset=utf-8",
     "draw.js": "text/javascript; charset=utf-8",
     "space.js": "text/javascript; charset=utf-8",
+    "region_colors.js": "text/javascript; charset=utf-8",
     "panel.js": "text/javascript; charset=utf-8",
     "playback.js": "text/javascript; charset=utf-8",
     "tool_look.js": "text/javascript; charset=utf-8",
     "tool_paint.js": "text/javascript; charset=utf-8",
     "tool_atoms.js": "text/javascript; charset=utf-8",
+    "tool_regions.js": "text/javascript; charset=utf-8",
     "tool_facets.js": "text/javascript; charset=utf-8",
     "tool_wells.js": "text/javascript; charset=utf-8",
 };

@@ -83,6 +83,11 @@ pub enum Command {
         /// Whether.
         shown: bool,
     },
+    /// Which parts of the cells are shown.
+    Parts {
+        /// The level, by its number of parts; none: no parts are shown.
+        count: Option<usize>,
+    },
     /// Asks for the command that makes the same mesh.
     CommandLine,
     /// Draws a synthetic image and opens it.

@@ -53,6 +53,7 @@ pub fn router(rooms: Rooms) -> Router {
         .route("/{name}", get(|Path(name): Path<String>| async move { asset_named(&name) }))
         .route("/view/slice", get(slice))
         .route("/view/cells", get(cells))
+        .route("/view/regions", get(regions))
         .route("/view/surface", get(surface))
         .route("/view/playback", get(playback))
         .route("/file/drop", post(drop_image))
@@ -103,6 +104,13 @@ async fn cells(
     Query(CellsAt { axis, at }): Query<CellsAt>,
 ) -> Response {
     looked(rooms, move |shown| shown.cells(axis, at)).await
+}
+
+async fn regions(
+    State(rooms): State<Rooms>,
+    Query(CellsAt { axis, at }): Query<CellsAt>,
+) -> Response {
+    looked(rooms, move |shown| shown.regions(axis, at)).await
 }
 
 async fn surface(State(rooms): State<Rooms>) -> Response {

@@ -1,8 +1,8 @@
 //! A session: what was done, in order, and the model that it makes; undo, redo, and the log.
 //!
 //! The model is a function of what was done. Undo goes back to a model that was kept, at or before the place wanted, and
-//! does again what lies between: the same bytes, since every gesture is deterministic. A model is kept before an atom is
-//! edited for the first time in a mesh, and every so many gestures; they share what they can, and the oldest are thinned out
+//! does again what lies between: the same bytes, since every gesture is deterministic. A model is kept before an atom or
+//! a region is edited for the first time in a mesh, and every so many gestures; they share what they can, and the oldest are thinned out
 //! when there are many.
 
 use std::path::{Path, PathBuf};
@@ -175,7 +175,7 @@ impl Session {
     /// # Errors
     /// [`JobError`] if it cannot be done; nothing has changed then.
     pub fn act(&mut self, gesture: Gesture, watch: &mut dyn Watch) -> Result<(), JobError> {
-        self.keep_before(edits_atoms(&gesture));
+        self.keep_before(needs_mesh(&gesture));
         // what one step does is done whole or not at all; of a longer path a part might be
         let is_path = matches!(&gesture, Gesture::Move { path, .. } if path.len() > 1);
         let before = is_path.then(|| self.model.clone());
@@ -277,7 +277,7 @@ impl Session {
         (self.done, self.model) = (at, model);
         while self.done < done {
             let step = self.steps[self.done].clone();
-            self.keep_before(matches!(&step, Step::Do(gesture) if edits_atoms(gesture)));
+            self.keep_before(matches!(&step, Step::Do(gesture) if needs_mesh(gesture)));
             let mut model = self.model.take();
             self.apply(&step, &mut model, watch)?;
             self.model = model;
@@ -321,7 +321,7 @@ impl Session {
             None => true,
             Some((at, _)) if self.done - at >= GESTURES_APART => true,
             // to go back into a mesh that has to be made again takes as long as that
-            Some((_, kept)) => is_edit && model.has_settled() && !kept.has_settled(),
+            Some((_, kept)) => is_edit && model.made_count() > kept.made_count(),
         };
         if !is_due {
             return;
@@ -357,9 +357,19 @@ fn nothing_open() -> JobError {
     JobError::misuse("no image is open")
 }
 
-fn edits_atoms(gesture: &Gesture) -> bool {
-    use Gesture::{Add, Move, Pin, Remove};
-    matches!(gesture, Add { .. } | Move { .. } | Remove { .. } | Pin { .. })
+/// Whether a gesture is done to the mesh, or its atoms, as they are.
+fn needs_mesh(gesture: &Gesture) -> bool {
+    use Gesture::{Add, MergeParts, Move, Pin, Region, Remove, SplitPart};
+    matches!(
+        gesture,
+        Add { .. }
+            | Move { .. }
+            | Remove { .. }
+            | Pin { .. }
+            | Region { .. }
+            | MergeParts { .. }
+            | SplitPart { .. }
+    )
 }
 
 /// Names of files that hold wherever the log is replayed on this machine.

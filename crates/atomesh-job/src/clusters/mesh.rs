@@ -16,6 +16,7 @@ use crate::error::JobError;
 use crate::features;
 use crate::files::check_voronoi;
 use crate::in_samples::InSamples;
+use crate::mesh::MadeMesh;
 use crate::sample::{Property, SampledMesh};
 use crate::session::Session;
 
@@ -158,6 +159,25 @@ pub fn facets_of_mesh<const D: usize>(
         .map(|group| (group, request.multiplier))
         .collect();
     (dimension.tools.shared_facets)(&loaded.mesh, field, &groups)
+}
+
+/// The facets between the cells of a mesh that a run has made, with the run's own b along them, which is known between points
+/// too; those that it names as features have the request's multiplier.
+///
+/// # Errors
+/// [`JobError`] if the watch ends the work.
+pub fn facets_of_outcome<const D: usize>(
+    request: &ClustersRequest,
+    made: &MadeMesh<'_, D>,
+    dimension: &Dimension<D>,
+    session: &mut Session<'_>,
+) -> Result<Vec<SharedFacet>, JobError> {
+    if let Some(cells) = made.loaded_cells() {
+        return cells.facets(request, None, dimension, session);
+    }
+    let outcome = made.outcome;
+    let field = (dimension.tools.field_along)(outcome.mesh(), outcome.potential(), session)?;
+    Ok(facets_of_mesh(request, &made.loaded()?, Some(&field), dimension))
 }
 
 impl<const D: usize> ClusteredMesh<D> for LoadedCells<D> {

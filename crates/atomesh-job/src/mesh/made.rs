@@ -1,6 +1,7 @@
 //! A mesh that a run has made, and what is done with it: looked at as if it had been read, and written.
 
 use atomesh::image::Image;
+use atomesh::mesh::Regions;
 use atomesh::run::Outcome;
 use atomesh_io::mesh::cells::LoadedCells;
 use atomesh_io::mesh::{LoadedMesh, OwnedField, World};
@@ -44,6 +45,8 @@ pub struct MadeMesh<'a, const D: usize> {
     pub world: &'a World,
     /// Properties of the cells, written with them.
     pub properties: &'a [Property],
+    /// The regions of the triangles or tetrahedra, in place of those that labels of the image give.
+    pub regions: Option<&'a Regions>,
 }
 
 impl<const D: usize> MadeMesh<'_, D> {
@@ -134,7 +137,7 @@ impl<const D: usize> MadeMesh<'_, D> {
         dimension: &Dimension<D>,
         session: &mut Session<'_>,
     ) -> Result<MeshSummary, JobError> {
-        let Self { run, outcome, image, world, properties } = *self;
+        let Self { run, outcome, image, world, properties, regions } = *self;
         let measured = match image {
             Some(image) if outputs.needs_report() => Measured::All(image),
             _ if wanted.measures_shape => Measured::Shape,
@@ -144,8 +147,16 @@ impl<const D: usize> MadeMesh<'_, D> {
         let tagged = session.write_together(|group, session| {
             let outputs = &outputs.staged(group)?;
             let recording = wanted.recording;
-            let writing =
-                Writing { run, outputs, outcome, world, properties, recording, dimension };
+            let writing = Writing {
+                run,
+                outputs,
+                outcome,
+                world,
+                properties,
+                regions,
+                recording,
+                dimension,
+            };
             let tagged = writing.write(image, session)?;
             self.write_about(&writing, &figures, session)?;
             Ok(tagged)

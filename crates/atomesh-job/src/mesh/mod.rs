@@ -260,7 +260,14 @@ impl FileRun<'_> {
         let mut recording =
             image.filter(|_| outputs.movie.is_some()).map(|image| Recording::new(image, units));
         let outcome = recorded(run, prepared, recording.as_mut(), session)?;
-        let made = MadeMesh { run, outcome: &outcome, image, world: &world, properties: &[] };
+        let made = MadeMesh {
+            run,
+            outcome: &outcome,
+            image,
+            world: &world,
+            properties: &[],
+            regions: None,
+        };
         let wanted =
             Wanted { recording: recording.as_ref(), measures_shape: self.options.measures_shape };
         made.write_outputs(outputs, wanted, dimension, session)

@@ -43,6 +43,8 @@ pub(super) struct Writing<'a, const D: usize> {
     pub world: &'a World,
     /// Properties of the cells.
     pub properties: &'a [Property],
+    /// The regions of the cells, in place of those that labels of the image give.
+    pub regions: Option<&'a Regions>,
     /// The atoms of the run, for a movie.
     pub recording: Option<&'a Recording<D>>,
     pub dimension: &'a Dimension<D>,
@@ -180,8 +182,14 @@ impl<const D: usize> Writing<'_, D> {
         let values = at_nodes(outcome.potential_at_points());
         // formats that hold tags have them as regions
         let labels = outcome.labels().filter(|_| !self.outputs.format.holds_tags());
-        let labels = labels.map(|l| l.iter().map(|&l| l as f32).collect::<Vec<f32>>());
-        let (tags, tagged) = self.tags(&mesh, session)?;
+        let as_values = |l: &[i32]| l.iter().map(|&l| l as f32).collect::<Vec<f32>>();
+        let labels = labels.map(as_values);
+        let regions = self.regions.filter(|_| !self.outputs.format.holds_tags());
+        let regions = regions.map(|regions| as_values(&regions.of_cells));
+        let (mut tags, tagged) = self.tags(&mesh, session)?;
+        if let Some(regions) = self.regions {
+            tags = replaced(&tags, &mesh, regions)?;
+        }
         if let Some(sections) = &self.outputs.sections {
             check_sections::<D>(sections, tags.regions(), session)?;
         }
@@ -199,6 +207,9 @@ impl<const D: usize> Writing<'_, D> {
         data = data.with_point_field("potential", &values).map_err(JobError::content)?;
         if let Some(labels) = &labels {
             data = data.with_cell_field("label", labels).map_err(JobError::content)?;
+        }
+        if let Some(regions) = &regions {
+            data = data.with_cell_field("region", regions).map_err(JobError::content)?;
         }
         for field in self.properties {
             data = data.with_cell_field(&field.name, field.values()).map_err(JobError::content)?;
@@ -305,6 +316,21 @@ fn check_sections<const D: usize>(
         session.change(format_args!("--material of region {}, which no cell has", material.region));
     }
     Ok(())
+}
+
+/// The tags with other regions.
+///
+/// # Errors
+/// [`JobError`] if a region has the name of a group, or there is not one for each cell.
+fn replaced<const D: usize>(
+    tags: &Tags<D>,
+    mesh: &Mesh<D>,
+    regions: &Regions,
+) -> Result<Tags<D>, JobError> {
+    let (groups, points) = (tags.facet_groups().to_vec(), tags.point_groups().to_vec());
+    Tags::new(mesh, groups, Some(regions.clone()))
+        .and_then(|tags| tags.with_point_groups(mesh, points))
+        .map_err(JobError::content)
 }
 
 /// The tags with regions beside them.

@@ -41,7 +41,10 @@ impl Request {
         match self {
             Self::Command(command, _) => !matches!(
                 command,
-                Command::Atoms { .. } | Command::CommandLine | Command::Ack { .. }
+                Command::Atoms { .. }
+                    | Command::Parts { .. }
+                    | Command::CommandLine
+                    | Command::Ack { .. }
             ),
             Self::OpenDropped { .. } | Self::End => true,
             Self::Export { .. } => false,

@@ -10,7 +10,7 @@ use serde_json::{Value, json};
 use sha2::{Digest, Sha256};
 
 use crate::gesture::PaintedField;
-use crate::model::{Model, each};
+use crate::model::{MOST_PARTS, MOST_REGIONS, Model, each};
 use crate::session::Session;
 
 /// What the engine knows beside the session.
@@ -21,6 +21,8 @@ pub struct Told<'a> {
     pub atoms_revision: u32,
     pub is_busy: bool,
     pub has_atoms: bool,
+    /// How many parts are shown, once they are made.
+    pub parts: Option<usize>,
     pub figures: &'a Value,
     pub hash: Option<&'a str>,
     pub error: Option<&'a str>,
@@ -35,6 +37,7 @@ pub fn state(session: &Session, told: &Told<'_>) -> Value {
         "image": told.image,
         "atomsRevision": told.atoms_revision,
         "hasAtoms": told.has_atoms,
+        "parts": told.parts,
         "busy": told.is_busy,
         "error": told.error,
         "undo": undo,
@@ -91,6 +94,10 @@ fn of_model<const D: usize>(model: &Model<D>) -> Value {
         "edited": model.is_edited(),
         "voronoi": model.run().is_voronoi(),
         "wells": wells,
+        "regions": stages.regions().map(|on_mesh| on_mesh.regions.clone()).unwrap_or_default(),
+        "regionNames": (1..=MOST_REGIONS).map(|region| model.regions().name(region)).collect::<Vec<_>>(),
+        "hasRegions": model.regions().is_any(),
+        "mostParts": stages.clustered().map_or(MOST_PARTS, |clustered| clustered.most()),
         "flow": flow.as_ref().map(|flow| json!({
             "rates": flow.rates,
             "imbalance": flow.imbalance,

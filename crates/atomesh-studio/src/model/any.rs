@@ -63,19 +63,19 @@ impl AnyModel {
         each!(self, model => model.command_line(folder, watch))
     }
 
-    /// Whether the atoms have settled.
-    pub fn has_settled(&self) -> bool {
-        each!(self, model => model.stages().has_settled())
+    /// [`Stages::made_count`](super::stages::Stages::made_count).
+    pub fn made_count(&self) -> usize {
+        each!(self, model => model.stages().made_count())
     }
 
-    /// Bytes that a copy may come to hold alone, about: atoms under edit, and paint.
+    /// Bytes that a copy may come to hold alone, about: atoms under edit, paint and regions.
     pub fn bytes(&self) -> usize {
         /// Bytes of an atom with its cells in an editor, in space.
         const ATOM: usize = 600;
         each!(self, model => {
             let atoms = model.edited().map_or(0, |edited| edited.atoms().len());
             let paint = usize::from(model.is_painted()) * 8 * model.grid().sample_count();
-            ATOM * atoms + paint
+            ATOM * atoms + paint + model.regions().bytes()
         })
     }
 }

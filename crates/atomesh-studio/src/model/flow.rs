@@ -171,6 +171,7 @@ impl<const D: usize> Model<D> {
             image: None,
             world: &images.world,
             properties: &[],
+            regions: None,
         };
         let tools = self.axes.dimension.tools;
         let mut options = FlowOptions::default();

@@ -1,4 +1,4 @@
-//! What is opened and done: an image, options, paint, edited atoms, barriers and wells, and the mesh made of them.
+//! What is opened and done: an image, options, paint, edited atoms, barriers, wells and regions, and the mesh made of them.
 //!
 //! A [`Model`] is a function of its image and of the gestures applied: the same gestures give the same bytes. What takes
 //! time is made when it is asked for ([`Model::refresh`]), from the stage that the gestures since have touched, and shared
@@ -9,6 +9,8 @@ mod atoms;
 mod flow;
 mod opened;
 mod paint;
+mod parts;
+mod regions;
 mod stages;
 mod wanted;
 
@@ -18,10 +20,12 @@ use std::sync::Arc;
 use atomesh::edit::Changes;
 use atomesh::geometry::Point;
 use atomesh::image::{Grid, Image, Units};
+use atomesh::mesh::Regions;
 use atomesh::run::Outcome;
 use atomesh::watch::Watch;
 use atomesh_job::mesh::{MadeMesh, MeshImages};
 use atomesh_job::options::RunConfig;
+use atomesh_job::sample::Property;
 use atomesh_job::{Dimension, JobError, Session};
 
 pub use any::AnyModel;
@@ -30,6 +34,8 @@ pub use atoms::Edited;
 pub use flow::{Barrier, Flow, Well};
 pub use opened::{AnyOpened, Opened, open, sha256};
 pub use paint::Paint;
+pub use parts::{MOST_PARTS, PartEdit};
+pub use regions::{MOST_REGIONS, OnMesh, Painted};
 pub use stages::Playback;
 
 use crate::gesture::{Gesture, PaintedField};
@@ -71,6 +77,7 @@ pub struct Model<const D: usize> {
     edited: Option<Arc<Edited<D>>>,
     barriers: Vec<Barrier<D>>,
     wells: Vec<Well<D>>,
+    regions: Painted<D>,
 }
 
 impl<const D: usize> Model<D> {
@@ -95,6 +102,7 @@ impl<const D: usize> Model<D> {
             edited: None,
             barriers: Vec::new(),
             wells: Vec::new(),
+            regions: Painted::default(),
         };
         model.images(watch)?;
         Ok(model)
@@ -108,8 +116,7 @@ impl<const D: usize> Model<D> {
         match gesture {
             Gesture::Set { option, value } => self.set(option, value, watch),
             Gesture::Paint { field, value, radius, path } => {
-                let path =
-                    path.iter().map(|p| self.lattice_place(p)).collect::<Result<Vec<_>, _>>()?;
+                let path = self.lattice_path(path)?;
                 self.paint(*field, *value, *radius, &path)
             }
             Gesture::Wipe { field } => {
@@ -122,8 +129,7 @@ impl<const D: usize> Model<D> {
                 self.edit(watch, |edited, _| edited.add(at))
             }
             Gesture::Move { atom, path, reach } => {
-                let path =
-                    path.iter().map(|p| self.lattice_place(p)).collect::<Result<Vec<_>, _>>()?;
+                let path = self.lattice_path(path)?;
                 self.edit(watch, |edited, pull| {
                     path.iter().try_for_each(|to| edited.step(*atom, to, *reach, pull).map(drop))
                 })
@@ -159,6 +165,19 @@ impl<const D: usize> Model<D> {
                 self.wells.remove(*well);
                 self.stages.forget_flow();
                 Ok(())
+            }
+            Gesture::Region { region, radius, path, parts } => {
+                let path = self.lattice_path(path)?;
+                self.paint_region(*region, (&path, *radius), *parts, watch)
+            }
+            Gesture::NameRegion { region, name } => self.name_region(*region, name),
+            Gesture::MergeParts { path, parts } => {
+                let edit = PartEdit::Merge(self.lattice_path(path)?);
+                self.edit_parts(edit, *parts, watch)
+            }
+            Gesture::SplitPart { first, second, parts } => {
+                let sides = [self.lattice_path(first)?, self.lattice_path(second)?];
+                self.edit_parts(PartEdit::Split(sides), *parts, watch)
             }
         }
     }
@@ -264,12 +283,20 @@ impl<const D: usize> Model<D> {
         let mut run = self.job_run();
         run.output.output = Some(path.into());
         let images = self.images(watch)?;
+        let regions = self.exported_regions(watch)?;
+        let as_values = |regions: &Regions| {
+            Property::new("region".into(), regions.of_cells.iter().map(|r| f64::from(*r)).collect())
+        };
+        // Voronoi's cells have values only
+        let is_voronoi = outcome.cells().is_some();
+        let values: Vec<Property> = regions.iter().filter(|_| is_voronoi).map(as_values).collect();
         let made = MadeMesh {
             run: &run,
             outcome: &outcome,
             image: Some(&images.image),
             world: &images.world,
-            properties: &[],
+            properties: &values,
+            regions: regions.as_ref().filter(|_| !is_voronoi),
         };
         made.write(&self.axes.dimension, &mut Session::new(watch)).map(drop)
     }
@@ -336,6 +363,10 @@ impl<const D: usize> Model<D> {
             let last = (grid.shape[k] - 1) as f64;
             place[k].clamp(0.0, last) * grid.step[k]
         }))
+    }
+
+    fn lattice_path(&self, path: &[Vec<f64>]) -> Result<Vec<Point<D>>, JobError> {
+        path.iter().map(|p| self.lattice_place(p)).collect()
     }
 
     fn images(&mut self, watch: &mut dyn Watch) -> Result<Arc<MeshImages<D>>, JobError> {

@@ -5,8 +5,10 @@
 
 use std::sync::Arc;
 
+use atomesh::geometry::Point;
 use atomesh::image::{Image, Samples};
 use atomesh::lattice::Lattice;
+use atomesh::region::CellFinder;
 use atomesh::run::{MeshKind, Outcome, Prepared, RunError, Settled, Size};
 use atomesh::watch::{AtomsView, Phase, Watch};
 use atomesh_job::mesh::{GivenField, GivenFields, MeshImages, prepare, refusal};
@@ -15,6 +17,8 @@ use atomesh_job::{JobError, Session};
 
 use super::Model;
 use super::flow::Flow;
+use super::parts::Clustered;
+use super::regions::OnMesh;
 use crate::gesture::PaintedField;
 
 /// Bytes of the largest record of iterations.
@@ -45,6 +49,9 @@ pub struct Stages<const D: usize> {
     playback: Option<Arc<Playback>>,
     outcome: Option<Arc<Outcome<D>>>,
     flow: Option<Arc<Flow<D>>>,
+    finder: Option<Arc<CellFinder<D>>>,
+    clustered: Option<Arc<Clustered>>,
+    regions: Option<Arc<OnMesh>>,
 }
 
 impl<const D: usize> Default for Stages<D> {
@@ -58,6 +65,9 @@ impl<const D: usize> Default for Stages<D> {
             playback: None,
             outcome: None,
             flow: None,
+            finder: None,
+            clustered: None,
+            regions: None,
         }
     }
 }
@@ -78,11 +88,6 @@ impl<const D: usize> Stages<D> {
         self.prepared.as_ref()
     }
 
-    /// Whether the atoms have settled.
-    pub fn has_settled(&self) -> bool {
-        self.settled.is_some()
-    }
-
     /// The mesh, if it was made.
     pub fn outcome(&self) -> Option<Arc<Outcome<D>>> {
         self.outcome.clone()
@@ -96,6 +101,32 @@ impl<const D: usize> Stages<D> {
     /// What flows, if it was computed.
     pub fn flow(&self) -> Option<Arc<Flow<D>>> {
         self.flow.clone()
+    }
+
+    /// What finds the mesh's cells, if anything did.
+    pub fn finder(&self) -> Option<Arc<CellFinder<D>>> {
+        self.finder.clone()
+    }
+
+    /// The cells in parts, if they were made.
+    pub fn clustered(&self) -> Option<Arc<Clustered>> {
+        self.clustered.clone()
+    }
+
+    /// The regions on the mesh, if there are any and they were made.
+    pub fn regions(&self) -> Option<Arc<OnMesh>> {
+        self.regions.clone()
+    }
+
+    /// The atoms where they have settled; none before.
+    pub fn settled_atoms(&self) -> &[Point<D>] {
+        self.settled.as_ref().map_or(&[], |settled| settled.lattice().atoms())
+    }
+
+    /// How much was made that takes time: atoms, the mesh, its parts.
+    pub fn made_count(&self) -> usize {
+        let made = [self.settled.is_some(), self.outcome.is_some(), self.clustered.is_some()];
+        made.into_iter().filter(|is_made| *is_made).count()
     }
 
     pub(super) fn images_or(
@@ -120,13 +151,32 @@ impl<const D: usize> Stages<D> {
         flow
     }
 
+    pub(super) fn keep_finder(&mut self, finder: CellFinder<D>) -> Arc<CellFinder<D>> {
+        self.finder.insert(Arc::new(finder)).clone()
+    }
+
+    pub(super) fn keep_clustered(&mut self, clustered: Clustered) -> Arc<Clustered> {
+        self.clustered.insert(Arc::new(clustered)).clone()
+    }
+
+    pub(super) fn keep_regions(&mut self, regions: OnMesh) -> Arc<OnMesh> {
+        self.regions.insert(Arc::new(regions)).clone()
+    }
+
     pub(super) fn forget_flow(&mut self) {
         self.flow = None;
+    }
+
+    pub(super) fn forget_regions(&mut self) {
+        self.regions = None;
     }
 
     pub(super) fn forget_outcome(&mut self) {
         self.outcome = None;
         self.flow = None;
+        self.finder = None;
+        self.clustered = None;
+        self.regions = None;
     }
 
     /// Forgets what a change touches.
@@ -294,7 +344,10 @@ impl<const D: usize> Model<D> {
         self.edited = match touched {
             // atoms stay where they are when only what comes after them changes
             Touched::Improve => self.edited.take(),
-            _ => None,
+            _ => {
+                self.regions.lose_atoms();
+                None
+            }
         };
     }
 

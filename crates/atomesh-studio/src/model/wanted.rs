@@ -60,7 +60,7 @@ impl<const D: usize> Model<D> {
     }
 
     /// The command that makes the same mesh, as its arguments. Painted fields are written into the session's folder for it.
-    /// Where atoms were edited by hand, or paint lies on a part of an image, the command replays the log.
+    /// Where atoms were edited or regions painted by hand, or paint lies on a part of an image, the command replays the log.
     ///
     /// # Errors
     /// [`JobError`] if a field cannot be written.
@@ -72,7 +72,8 @@ impl<const D: usize> Model<D> {
         let is_painted = self.size_paint.is_some() || self.weight_paint.is_some();
         let is_whole = self.run.frame.is_empty();
         let text = |path: &Path| path.display().to_string();
-        if self.is_edited() || (is_painted && !is_whole) || self.run.input.shown().is_none() {
+        let is_by_hand = self.is_edited() || self.regions.is_any();
+        if is_by_hand || (is_painted && !is_whole) || self.run.input.shown().is_none() {
             let log = text(&folder.join(crate::session::LOG_FILE));
             return Ok(["atomesh", "replay", &log, "-o", "mesh.vtu"].map(Into::into).into());
         }

@@ -13,7 +13,7 @@ use atomesh_studio::replay::replay;
 use serde_json::{Value, json};
 
 use super::chromium::Tab;
-use super::client::Studio;
+use super::client::{Studio, image_file};
 
 const CTRL: u32 = 2;
 const SHIFT: u32 = 8;
@@ -606,6 +606,104 @@ fn facets_are_clicked() {
     tab.drag(&[at], "left", SHIFT);
     tab.until(&format!("{closed} < {} && !studio.state.busy", before - 1));
     assert!(tab.picture().count(low, high, is_red) < red);
+}
+
+#[test]
+fn regions_are_painted_over_parts_and_are_there_after_a_reload() {
+    let folder = tempfile::tempdir().unwrap();
+    let Some(mut tab) = Tab::open() else { return };
+    let studio = Studio::on_file(&image_file(folder.path()), "[lattice]\nsize = 4.0");
+    tab.go(&studio.address);
+    tab.settle();
+    tab.key("g", 0);
+    // the image's light grey is not as white as borders
+    tab.value("(studio.window = [0, 400], studio.redraw())");
+    tab.frame();
+    let (low, high) = (tab.place(0, [0.0, 0.0]), tab.place(0, [63.0, 47.0]));
+    let is_white = |[r, g, b]: [u8; 3]| r > 235 && g > 235 && b > 225;
+    assert_eq!(tab.picture().count(low, high, is_white), 0);
+    tab.key("5", 0);
+    tab.until("studio.state.parts > 3 && !studio.state.busy && studio.views[0].regions");
+    tab.frame();
+    let white = tab.picture().count(low, high, is_white);
+    assert!(white > 500, "borders of parts are drawn: {white}");
+    tab.value("studio.tool.setCount(4)");
+    tab.until("studio.state.parts === 4 && !studio.state.busy");
+    tab.settle();
+    tab.frame();
+    let fewer = tab.picture().count(low, high, is_white);
+    assert!(fewer < white, "fewer parts have fewer borders: {fewer}");
+    // the first region is a warm red, the second green
+    let is_warm = |[r, _, b]: [u8; 3]| r > b.saturating_add(30);
+    let is_green = |[r, g, b]: [u8; 3]| g > r.saturating_add(15) && g > b;
+    assert_eq!(tab.picture().count(low, high, is_warm), 0);
+    let path = [[10.0, 10.0], [20.0, 9.0]].map(|sample| tab.place(0, sample));
+    tab.drag(&path, "left", 0);
+    let is_painted = "studio.model.regions.length === 1 && !studio.state.busy && \
+                      studio.views[0].regions?.groups.length === 1";
+    tab.until(is_painted);
+    tab.frame();
+    let warm = tab.picture().count(low, high, is_warm);
+    assert!(warm > 2000, "the part is filled: {warm}");
+    assert!(is_warm(tab.picture().at(tab.place(0, [14.0, 13.0]))));
+    // another region, named
+    select(&mut tab, "region", "2");
+    tab.value(
+        "(() => { const n = document.getElementById('region-name'); n.value = 'sand'; \
+         n.dispatchEvent(new Event('change')); })()",
+    );
+    tab.until("studio.model.regionNames[1] === 'sand'");
+    let at = tab.place(0, [50.0, 40.0]);
+    tab.drag(&[at], "left", 0);
+    tab.until("studio.model.regions.length === 2 && !studio.state.busy && studio.views[0].regions.groups.length === 2");
+    tab.frame();
+    assert!(tab.picture().count(low, high, is_green) > 500);
+    tab.keep_picture("studio-regions.png");
+    let legend = tab.value("document.getElementById('legend').textContent");
+    assert!(legend.as_str().unwrap().contains("sand"), "{legend}");
+    // reloaded, it is there
+    let before = tab.value("studio.model.regions");
+    tab.value("location.reload()");
+    tab.until("window.studio && studio.model?.regions.length === 2 && studio.views[0]?.regions?.groups.length === 2");
+    assert_eq!(tab.value("studio.model.regions"), before);
+    tab.settle();
+    tab.frame();
+    let (low, high) = (tab.place(0, [0.0, 0.0]), tab.place(0, [63.0, 47.0]));
+    assert!(tab.picture().count(low, high, is_warm) > 2000);
+    // and undone, it is not
+    (0..3).for_each(|_| tab.key("z", CTRL));
+    tab.until("studio.model.regions.length === 0 && !studio.state.busy && !studio.views[0].regions");
+    tab.frame();
+    assert_eq!(tab.picture().count(low, high, is_warm), 0);
+    assert_eq!(tab.complaints(), Vec::<String>::new());
+}
+
+#[test]
+fn regions_of_a_volume_are_seen_on_slices_and_in_space() {
+    let Some(mut tab) = Tab::open() else { return };
+    let studio = Studio::empty();
+    tab.go(&studio.address);
+    tab.until("window.studio && studio.state && !document.getElementById('welcome').hidden");
+    tab.value("studio.ask({ op: 'scene', name: 'sphere', seed: 0 })");
+    tab.value("studio.do({ do: 'set', option: 'features.features', value: 'edges' })");
+    tab.value("studio.do({ do: 'set', option: 'lattice.size', value: 14 })");
+    tab.settle();
+    tab.key("g", 0);
+    tab.key("5", 0);
+    tab.value("studio.tool.setCount(2)");
+    tab.until("studio.state.parts === 2 && !studio.state.busy && studio.views[0].regions");
+    let at = tab.place(0, [48.0, 48.0]);
+    tab.drag(&[at], "left", 0);
+    tab.until("studio.model.regions.length === 1 && !studio.state.busy && studio.views.every((v) => v.regions?.groups.length === 1)");
+    tab.until("studio.space.surface?.count > 50");
+    tab.frame();
+    tab.keep_picture("regions-space.png");
+    let is_warm = |[r, _, b]: [u8; 3]| r > b.saturating_add(30);
+    let picture = tab.picture();
+    for view in 0..3 {
+        assert!(is_warm(picture.at(tab.place(view, [44.0, 52.0]))), "view {view}");
+    }
+    assert_eq!(tab.complaints(), Vec::<String>::new());
 }
 
 /// Chooses an option of a list, as a hand would.

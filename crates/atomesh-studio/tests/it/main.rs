@@ -4,4 +4,5 @@ mod browser;
 mod chromium;
 mod client;
 mod edits;
+mod regions;
 mod security;

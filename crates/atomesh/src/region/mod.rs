@@ -7,10 +7,12 @@
 //! - [`interfaces`] lie between cells of two labels, a [`closed_surface`] bounds those of one; [`join_islands`] removes
 //!   small groups of cells. A [`ThinLayer`] of a label is too thin for the edges asked for.
 //! - [`components`] are the parts into which facets cut a mesh.
+//! - Labels given to the cells of one mesh are carried to another ([`CellFinder`]), with atoms that moved ([`AtomMoves`]).
 //!
 //! Outlines come before the lattice, which grows on them; labels need only a mesh.
 
 mod adjust;
+mod carry;
 mod components;
 mod islands;
 mod labels;
@@ -21,6 +23,7 @@ mod regularity;
 mod trim;
 
 pub use adjust::{fit_facets, smooth_outline};
+pub use carry::{AtomMoves, CellFinder};
 pub use components::components;
 pub(crate) use islands::fill_labels;
 pub use islands::join_islands;

@@ -1,0 +1,139 @@
+// Tool 5: regions. A stroke gives the parts that it touches a region; Shift paints single cells, Ctrl erases. Parts are
+// merged by a stroke across them, and split between two strokes.
+
+import { colorOf } from "./region_colors.js";
+
+const HANDS = ["paint", "merge", "split"];
+
+export class Regions {
+  /** @param {any} app */
+  constructor(app) {
+    this.app = app;
+    this.dimsMesh = true;
+    this.paintsRegions = true;
+    this.count = 20;
+    this.region = 1;
+    this.hand = "paint";
+    this.brush = 0;
+    this.hint = "Drag over parts to give them the region; Shift paints cells, Ctrl erases; m merges, s splits; [ and ] change the brush.";
+  }
+
+  enter() {
+    if (this.brush === 0) this.brush = (this.app.distance?.mean ?? 0) / 4;
+    this.tell();
+  }
+
+  leave() {
+    this.app.link.send({ op: "parts", count: null });
+    this.first = null;
+  }
+
+  /** Says which parts are wanted. */
+  tell() {
+    this.app.link.send({ op: "parts", count: this.count });
+  }
+
+  setCount(count) {
+    this.count = count;
+    this.tell();
+  }
+
+  setHand(hand) {
+    this.hand = this.hand === hand ? "paint" : hand;
+    this.first = null;
+    this.app.panel.update();
+    this.app.redraw();
+  }
+
+  resize(factor) {
+    this.brush *= factor;
+    this.app.redraw();
+    this.app.panel.update();
+  }
+
+  down(view, event) {
+    this.path = [view.toSamples(event.offsetX, event.offsetY)];
+    this.pathView = view;
+    this.erases = event.ctrlKey || event.metaKey;
+    this.isOfCells = event.shiftKey;
+    this.app.redraw();
+  }
+
+  move(view, event) {
+    this.over = { view, at: view.toSamples(event.offsetX, event.offsetY) };
+    if (this.path && view === this.pathView) {
+      const last = view.toPixels(this.path[this.path.length - 1]);
+      const apart = Math.hypot(last[0] - event.offsetX, last[1] - event.offsetY);
+      if (apart > 3 && this.path.length < 2000) this.path.push(this.over.at);
+    }
+    this.app.redraw();
+  }
+
+  up(view) {
+    if (!this.path) return;
+    const path = this.path.map((s) => view.place(s));
+    const { app, count } = this;
+    this.path = null;
+    if (this.hand === "merge") {
+      app.do({ do: "merge-parts", path, parts: count });
+    } else if (this.hand === "split") {
+      if (this.first) app.do({ do: "split-part", first: this.first, second: path, parts: count });
+      else app.say("Now mark the other side.", true);
+      this.first = this.first ? null : path;
+    } else {
+      const region = this.erases ? 0 : this.region;
+      app.do({ do: "region", region, radius: this.brush, path, parts: this.isOfCells ? null : count });
+    }
+    this.app.redraw();
+  }
+
+  draw(view, box) {
+    const own = colorOf(this.region).map((c) => c / 255);
+    const ink = this.erases && this.path ? [1, 0.4, 0.4, 0.9] : this.hand === "paint" ? [...own, 1] : [1, 1, 1, 0.9];
+    if (this.path && this.pathView === view) this.drawPath(view, "stroke", this.path, box, ink);
+    if (this.first && this.app.dimension === 2) this.drawPath(view, "first", this.first, box, [1, 0.7, 0.3, 1]);
+    if (this.over?.view === view) view.circle("brush", this.over.at, this.brush, box, ink);
+  }
+
+  drawPath(view, name, path, box, ink) {
+    const [nx, ny] = view.shape;
+    const places = new Float32Array(path.flatMap(([x, y]) => [x / Math.max(1, nx - 1), y / Math.max(1, ny - 1)]));
+    view.drawing.strips(name, places, [path.length], box, ink);
+  }
+
+  /** The controls of the tool, for the panel. @param {(tag: string, properties?: object, ...children: any[]) => any} make */
+  controls(make) {
+    const { app } = this;
+    const { model } = app.state;
+    const count = make("input", { type: "range", id: "parts", min: "1", max: String(model.mostParts), step: "1", value: String(this.count) });
+    const shown = make("output", { textContent: String(this.count) });
+    count.oninput = () => (shown.textContent = count.value);
+    count.onchange = () => this.setCount(Number(count.value));
+    const region = make("select", { id: "region" });
+    model.regionNames.slice(0, 16).forEach((name, i) => region.append(make("option", { value: String(i + 1), textContent: `${i + 1} ${name}` })));
+    region.value = String(this.region);
+    region.onchange = () => {
+      this.region = Number(region.value);
+      region.blur();
+      app.panel.update();
+      app.redraw();
+    };
+    const name = make("input", { type: "text", id: "region-name", value: model.regionNames[this.region - 1], maxLength: 64 });
+    name.onchange = () => {
+      name.blur();
+      app.do({ do: "name-region", region: this.region, name: name.value });
+    };
+    const hands = HANDS.map((hand) => {
+      const button = make("button", { textContent: hand, onclick: () => this.setHand(hand) });
+      button.setAttribute("aria-pressed", String(this.hand === hand));
+      return button;
+    });
+    return [
+      make("label", {}, make("span", { textContent: "parts" }), count, shown),
+      make("label", {}, make("span", { textContent: "region" }), region, make("output")),
+      make("label", {}, make("span", { textContent: "name" }), name, make("output")),
+      make("div", { className: "row" }, ...hands),
+      make("p", { textContent: `Brush: ${this.brush.toPrecision(3)} ${model.units[0] ?? "units"}` }),
+    ];
+  }
+}
