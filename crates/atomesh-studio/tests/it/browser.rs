@@ -372,8 +372,12 @@ fn every_key_does_what_the_list_says() {
         tab.until(expression);
         seen.push(if modifiers & CTRL > 0 { format!("Ctrl+{key}") } else { key.to_owned() });
     };
-    for (number, tool) in [("2", 2), ("3", 3), ("4", 4), ("6", 6), ("7", 7), ("1", 1)] {
+    for (number, tool) in [("5", 5), ("2", 2), ("3", 3), ("4", 4), ("6", 6), ("7", 7), ("1", 1)] {
         check(&mut tab, number, 0, &format!("studio.tool === studio.tools[{tool}]"));
+        if tool == 5 {
+            check(&mut tab, "m", 0, "studio.tool.hand === 'merge'");
+            check(&mut tab, "s", 0, "studio.tool.hand === 'split'");
+        }
     }
     tab.value("studio.views[0].zoomAt(100, 100, 3)");
     check(&mut tab, "r", 0, "Math.abs(studio.views[0].center[0] - 47.5) < 1e-9");
