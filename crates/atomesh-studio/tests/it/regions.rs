@@ -39,12 +39,9 @@ fn thickest(layers: &Layers<3>, of_samples: &[usize]) -> Vec<usize> {
     of_samples.iter().for_each(|layer| counts[*layer] += 1);
     let mut inside: Vec<(f64, usize)> = (1..layers.horizons.len())
         .map(|layer| (layers.horizons[layer] - layers.horizons[layer - 1], layer))
-        .filter(|(thickness, layer)| {
-            counts[*layer] as f64 > 0.9 * thickness * (SIDE * SIDE) as f64
-        })
+        .filter(|(thickness, layer)| counts[*layer] as f64 > 0.9 * thickness * (SIDE * SIDE) as f64)
         .collect();
     inside.sort_by(|a, b| b.0.total_cmp(&a.0));
-    println!("{inside:?}");
     let mut chosen: Vec<usize> = inside.into_iter().take(6).map(|(_, layer)| layer).collect();
     chosen.sort_unstable();
     chosen
@@ -90,38 +87,35 @@ fn dice(path: &Path, layers: &[usize], of_samples: &[usize]) -> Vec<f64> {
     layers.iter().enumerate().map(|(i, layer)| of(i + 1, *layer)).collect()
 }
 
+/// What 36 strokes reach: the mean is far from what a hand with more patience does, as parts pass from a layer to the next
+/// where horizons of one polarity are found alone.
+const LEAST_DICE: f64 = 0.65;
+
 #[test]
+#[ignore = "a minute and a half, most of it the distances of samples to the mesh"]
 fn layers_are_painted_by_a_few_strokes() {
     let folder = tempfile::tempdir().unwrap();
     let path = folder.path().join("session");
-    let var = |name: &str, other: &str| std::env::var(name).unwrap_or(other.into());
     let options = SynthOptions { seed: 3, ..SynthOptions::new([SIDE; 3]) };
     let layers = synthesize(Scene::Layers, &options).unwrap().truth.layers.unwrap();
     let of_samples = layers_of_samples(&layers);
     let chosen = thickest(&layers, &of_samples);
-    let t = std::time::Instant::now();
     let mut session = Session::open(&path, &mut Silent).unwrap();
-    let run = RunConfig::parse(&var("TOML", "[lattice]\nsize = 6.0\n[features]\nfeatures = \"horizons\"\n").replace(';', "\n")).unwrap();
+    let run = "[lattice]\nsize = 6.0\n[features]\nfeatures = \"horizons\"\n";
+    let run = RunConfig::parse(run).unwrap();
     let source = Source::Scene { name: "layers".into(), seed: 3 };
     session.open_image(source, run, &mut Silent).unwrap();
     let file = folder.path().join("mesh.vtu");
-    session.write(&file, &mut Silent).unwrap();
-    println!("mesh {:?}", t.elapsed());
-    let level: usize = var("LEVEL", "256").parse().unwrap();
-    let slices: Vec<usize> = var("SLICES", "8,24,40,56,72,88").split(',').map(|s| s.parse().unwrap()).collect();
-    let mut count = 0;
     for (region, layer) in (1..).zip(&chosen) {
-        for path in strokes(&layers, *layer, &slices, 6) {
-            act(&mut session, json!({ "do": "region", "region": region, "radius": 0.0, "path": path, "parts": level }));
-            if count == 0 { println!("tree {:?}", t.elapsed()); }
-            count += 1;
+        for path in strokes(&layers, *layer, &[8, 24, 40, 56, 72, 88], 6) {
+            let stroke = json!({ "do": "region", "region": region, "radius": 0.0, "path": path, "parts": 256 });
+            act(&mut session, stroke);
         }
     }
-    println!("painted {:?} {count}", t.elapsed());
     session.write(&file, &mut Silent).unwrap();
     let found = dice(&file, &chosen, &of_samples);
-    println!("{chosen:?} {found:?} mean {}", found.iter().sum::<f64>() / 6.0);
-    println!("{:?}", t.elapsed());
+    let mean = found.iter().sum::<f64>() / found.len() as f64;
+    assert!(mean > LEAST_DICE, "{mean} of {found:?}");
     let again = folder.path().join("again.vtu");
     replay(&path.join("log.jsonl"), &again, &mut Silent).unwrap();
     assert!(std::fs::read(&file).unwrap() == std::fs::read(&again).unwrap(), "as the log has it");
@@ -174,13 +168,17 @@ fn regions_are_undone_redone_replayed_and_exported_with_their_names() {
         let bytes = exported(&mut session, folder, &format!("all.{format}"));
         if ["inp", "msh", "msh2"].contains(&format) {
             let text = String::from_utf8_lossy(&bytes);
-            assert!(["sand", "region-1", "rest"].iter().all(|name| text.contains(name)), "{format}");
+            assert!(
+                ["sand", "region-1", "rest"].iter().all(|name| text.contains(name)),
+                "{format}"
+            );
         }
         let again = folder.join(format!("again.{format}"));
         replay(&folder.join("session/log.jsonl"), &again, &mut Silent).unwrap();
         assert!(bytes == std::fs::read(&again).unwrap(), "replayed as {format}");
     }
-    let names: Vec<String> = cells_of_regions(&mut session, folder).into_iter().map(|r| r.0).collect();
+    let names: Vec<String> =
+        cells_of_regions(&mut session, folder).into_iter().map(|r| r.0).collect();
     assert_eq!(names, ["rest", "region-1", "sand"]);
     let all = exported(&mut session, folder, "all.vtu");
     (0..5).for_each(|_| session.undo(&mut Silent).unwrap());
@@ -209,7 +207,11 @@ fn regions_go_with_their_atoms_and_stay_when_atoms_are_made_again() {
     let edited = share(&cells_of_regions(&mut session, folder));
     assert!((edited - whole).abs() < 0.05, "{whole} {edited}");
     // other atoms altogether
-    for (option, value) in [("lattice.size", json!(3.5)), ("lattice.mesh", json!("voronoi")), ("lattice.mesh", Value::Null)] {
+    for (option, value) in [
+        ("lattice.size", json!(3.5)),
+        ("lattice.mesh", json!("voronoi")),
+        ("lattice.mesh", Value::Null),
+    ] {
         act(&mut session, json!({ "do": "set", "option": option, "value": value }));
     }
     let other = share(&cells_of_regions(&mut session, folder));
@@ -234,12 +236,18 @@ fn parts_are_merged_and_split_by_strokes() {
     let (a, b) = (count(&mut session, above), count(&mut session, below));
     act(&mut session, json!({ "do": "merge-parts", "path": [above, below], "parts": 4 }));
     assert!(count(&mut session, above) >= a + b, "they are one");
-    act(&mut session, json!({ "do": "split-part", "first": [[12.0, 8.0], [30.0, 8.0]], "second": [[12.0, 40.0], [30.0, 40.0]], "parts": 4 }));
+    act(
+        &mut session,
+        json!({ "do": "split-part", "first": [[12.0, 8.0], [30.0, 8.0]], "second": [[12.0, 40.0], [30.0, 40.0]], "parts": 4 }),
+    );
     let (again, other) = (count(&mut session, above), count(&mut session, below));
     assert!(again.abs_diff(a) < a / 5 && other.abs_diff(b) < b / 5, "{a} {b} {again} {other}");
     for (gesture, why) in [
         (json!({ "do": "merge-parts", "path": [above], "parts": 4 }), "one part"),
-        (json!({ "do": "split-part", "first": [above], "second": [below], "parts": 4 }), "two sides"),
+        (
+            json!({ "do": "split-part", "first": [above], "second": [below], "parts": 4 }),
+            "two sides",
+        ),
         (json!({ "do": "split-part", "first": [], "second": [], "parts": 4 }), "two sides"),
         (stroke(65, json!([above]), None), "region 65"),
         (json!({ "do": "name-region", "region": 1, "name": "xmin" }), "something else"),
