@@ -142,7 +142,10 @@ class App {
     document.body.classList.toggle("down", !up);
     if (up) {
       this.wasUp = true;
-      if (this.tool.showsAtoms || this.tool.paintsRegions) this.tool.enter();
+      if (this.tool.showsAtoms) this.tool.enter();
+      // the page before a reload may have wanted parts
+      if (this.tool.paintsRegions) this.tool.enter();
+      else this.link.send({ op: "parts", count: null });
     } else if (this.wasUp) {
       this.say("The studio has ended or cannot be reached; it is tried again.");
     }

@@ -20,15 +20,18 @@ export function styleOf(region) {
  * @param {import("./draw.js").Drawing} drawing
  * @param {any} areas as `readRegions` gives them
  * @param {{scale: number[], shift: number[]}} box
+ * @param {boolean} showsParts
  */
-export function drawRegions(drawing, areas, box) {
+export function drawRegions(drawing, areas, box, showsParts) {
   for (const { region, corners } of areas.groups) {
     drawing.triangles(`region ${region}`, areas.places, corners, box, [...colorOf(region).map((c) => c / 255), 0.4]);
   }
-  // dark beside white, to be seen on any image
-  areas.lines ??= segmentsOf(areas.places, areas.parts);
-  drawing.segments("shade", areas.lines.ends, areas.lines.dark, box, 3.5);
-  drawing.segments("parts", areas.lines.ends, areas.lines.white, box, 1.5);
+  if (showsParts) {
+    // dark beside white, to be seen on any image
+    areas.lines ??= segmentsOf(areas.places, areas.parts);
+    drawing.segments("shade", areas.lines.ends, areas.lines.dark, box, 3.5);
+    drawing.segments("parts", areas.lines.ends, areas.lines.white, box, 1.5);
+  }
   drawing.edges("borders", areas.places, areas.borders, box, [1, 0.95, 0.4, 1]);
 }
 

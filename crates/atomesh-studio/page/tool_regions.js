@@ -15,6 +15,8 @@ export class Regions {
     this.region = 1;
     this.hand = "paint";
     this.brush = 0;
+    /** @type {number | null} the region whose cells alone are changed */
+    this.only = null;
     this.hint = "Drag over parts to give them the region; Shift paints cells, Ctrl erases; m merges, s splits; [ and ] change the brush.";
   }
 
@@ -82,7 +84,7 @@ export class Regions {
       this.first = this.first ? null : path;
     } else {
       const region = this.erases ? 0 : this.region;
-      app.do({ do: "region", region, radius: this.brush, path, parts: this.isOfCells ? null : count });
+      app.do({ do: "region", region, radius: this.brush, path, parts: this.isOfCells ? null : count, over: this.only });
     }
     this.app.redraw();
   }
@@ -118,6 +120,14 @@ export class Regions {
       app.panel.update();
       app.redraw();
     };
+    const only = make("select", { id: "over" });
+    only.append(make("option", { value: "", textContent: "everything" }), make("option", { value: "0", textContent: "rest" }));
+    for (const { region: number, name } of model.regions) only.append(make("option", { value: String(number), textContent: name }));
+    only.value = this.only === null ? "" : String(this.only);
+    only.onchange = () => {
+      this.only = only.value === "" ? null : Number(only.value);
+      only.blur();
+    };
     const name = make("input", { type: "text", id: "region-name", value: model.regionNames[this.region - 1], maxLength: 64 });
     name.onchange = () => {
       name.blur();
@@ -132,6 +142,7 @@ export class Regions {
       make("label", {}, make("span", { textContent: "parts" }), count, shown),
       make("label", {}, make("span", { textContent: "region" }), region, make("output")),
       make("label", {}, make("span", { textContent: "name" }), name, make("output")),
+      make("label", {}, make("span", { textContent: "paint over" }), only, make("output")),
       make("div", { className: "row" }, ...hands),
       make("p", { textContent: `Brush: ${this.brush.toPrecision(3)} ${model.units[0] ?? "units"}` }),
     ];

@@ -209,7 +209,7 @@ export class View {
     }
     const mesh = app.dimension === 3 ? this.cells : app.frames.mesh;
     const isEditing = app.tool.showsAtoms && app.dimension === 2 && app.frames.atoms;
-    if (this.regions && !app.played) drawRegions(drawing, this.regions, box);
+    if (this.regions && !app.played) drawRegions(drawing, this.regions, box, Boolean(app.tool.paintsRegions));
     if (app.played) {
       this.drawPlayed(box);
     } else if (app.showsMesh && mesh && !isEditing) {

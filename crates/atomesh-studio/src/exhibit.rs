@@ -141,8 +141,7 @@ impl<const D: usize> Exhibit for Shown<D> {
         let mut triangles: Vec<(u16, [Point<D>; D])> = Vec::new();
         if outcome.cells().is_none() {
             let tags = outcome.tags().ok()?;
-            let groups =
-                tags.facet_groups().iter().filter(|group| is_feature_name(&group.name));
+            let groups = tags.facet_groups().iter().filter(|group| is_feature_name(&group.name));
             for (group, number) in groups.zip(1_u16..REGION) {
                 let facets = group.facets.iter();
                 let facets = facets.map(|facet| facet.map(|corner| points[corner as usize]));

@@ -117,6 +117,9 @@ pub enum Gesture {
         path: Vec<Vec<f64>>,
         /// The level whose parts are touched; none: single cells.
         parts: Option<usize>,
+        /// The region whose cells alone are given another, 0 for those of none; none: all.
+        #[serde(default, skip_serializing_if = "Option::is_none")]
+        over: Option<u32>,
     },
     /// Names a region.
     NameRegion {

@@ -136,13 +136,12 @@ impl<const D: usize> Section<'_, D> {
         let points = self.points;
         let is_below = |corner: u32| points[corner as usize][axis] < level;
         let next = corners.iter().cycle().skip(1);
-        let mut ends = corners.iter().zip(next).filter_map(|(&a, &b)| {
-            match (is_below(a), is_below(b)) {
+        let mut ends =
+            corners.iter().zip(next).filter_map(|(&a, &b)| match (is_below(a), is_below(b)) {
                 (true, false) => Some([a, b]),
                 (false, true) => Some([b, a]),
                 _ => None,
-            }
-        });
+            });
         let (first, second) = (ends.next()?, ends.next()?);
         Some([self.place(first, axis, level), self.place(second, axis, level)])
     }

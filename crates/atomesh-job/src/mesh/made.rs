@@ -147,16 +147,8 @@ impl<const D: usize> MadeMesh<'_, D> {
         let tagged = session.write_together(|group, session| {
             let outputs = &outputs.staged(group)?;
             let recording = wanted.recording;
-            let writing = Writing {
-                run,
-                outputs,
-                outcome,
-                world,
-                properties,
-                regions,
-                recording,
-                dimension,
-            };
+            let writing =
+                Writing { run, outputs, outcome, world, properties, regions, recording, dimension };
             let tagged = writing.write(image, session)?;
             self.write_about(&writing, &figures, session)?;
             Ok(tagged)

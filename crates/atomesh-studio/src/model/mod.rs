@@ -35,6 +35,7 @@ pub use flow::{Barrier, Flow, Well};
 pub use opened::{AnyOpened, Opened, open, sha256};
 pub use paint::Paint;
 pub use parts::{MOST_PARTS, PartEdit};
+use regions::Stroke;
 pub use regions::{MOST_REGIONS, OnMesh, Painted};
 pub use stages::Playback;
 
@@ -166,9 +167,10 @@ impl<const D: usize> Model<D> {
                 self.stages.forget_flow();
                 Ok(())
             }
-            Gesture::Region { region, radius, path, parts } => {
+            Gesture::Region { region, radius, path, parts, over } => {
                 let path = self.lattice_path(path)?;
-                self.paint_region(*region, (&path, *radius), *parts, watch)
+                let stroke = Stroke { path: &path, radius: *radius, level: *parts, over: *over };
+                self.paint_region(*region, stroke, watch)
             }
             Gesture::NameRegion { region, name } => self.name_region(*region, name),
             Gesture::MergeParts { path, parts } => {

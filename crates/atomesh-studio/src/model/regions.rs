@@ -74,6 +74,19 @@ struct Cells<const D: usize> {
     atoms_made: u32,
 }
 
+/// A stroke of the brush, in lattice units, and what it changes.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct Stroke<'a, const D: usize> {
+    /// The path.
+    pub path: &'a [Point<D>],
+    /// The brush's radius.
+    pub radius: f64,
+    /// The level whose parts it touches; `None`: single cells.
+    pub level: Option<usize>,
+    /// The region whose cells alone it changes.
+    pub over: Option<u32>,
+}
+
 /// A region as it lies on the mesh.
 #[derive(Clone, Debug, PartialEq, serde::Serialize)]
 pub struct ShownRegion {
@@ -150,13 +163,13 @@ impl<const D: usize> Model<D> {
     pub(super) fn paint_region(
         &mut self,
         region: u32,
-        stroke: (&[Point<D>], f64),
-        level: Option<usize>,
+        stroke: Stroke<'_, D>,
         watch: &mut dyn Watch,
     ) -> Result<(), JobError> {
         check_number(region, 0)?;
+        check_number(stroke.over.unwrap_or(0), 0)?;
         let touched = self.touched(stroke, watch)?;
-        let chosen: Vec<bool> = match level {
+        let chosen: Vec<bool> = match stroke.level {
             None => {
                 let mut chosen = vec![false; self.finder(watch)?.cell_count()];
                 touched.iter().for_each(|&cell| chosen[cell as usize] = true);
@@ -174,8 +187,11 @@ impl<const D: usize> Model<D> {
         let before = self.on_mesh(watch)?;
         let mut regions =
             before.map_or_else(|| vec![0; chosen.len()], |known| known.of_cells.clone());
-        for (own, _) in regions.iter_mut().zip(chosen).filter(|(_, chosen)| *chosen) {
-            *own = region as i32;
+        let over = stroke.over.map(|over| over as i32);
+        for (own, chosen) in regions.iter_mut().zip(chosen) {
+            if chosen && over.is_none_or(|over| *own == over) {
+                *own = region as i32;
+            }
         }
         let is_none = regions.iter().all(|own| *own == 0);
         let cells = Cells {
@@ -196,11 +212,14 @@ impl<const D: usize> Model<D> {
         let is_plain = |c: char| c.is_ascii_alphanumeric() || "_-.".contains(c);
         let begins = name.starts_with(|c: char| c.is_ascii_alphabetic());
         if !begins || name.len() > 64 || !name.chars().all(is_plain) {
-            let message = format!("the name {name:?}; expected a letter, then letters, digits, '_', '-' or '.', 64 at most");
+            let message = format!(
+                "the name {name:?}; expected a letter, then letters, digits, '_', '-' or '.', 64 at most"
+            );
             return Err(JobError::misuse(message));
         }
         let others = (1..=MOST_REGIONS).filter(|other| *other != region);
-        let is_taken = is_other_name(name) || others.into_iter().any(|o| self.regions.name(o) == name);
+        let is_taken =
+            is_other_name(name) || others.into_iter().any(|o| self.regions.name(o) == name);
         if is_taken {
             return Err(JobError::misuse(format!("the name {name:?} is that of something else")));
         }
@@ -212,7 +231,7 @@ impl<const D: usize> Model<D> {
     /// The cells at a path, and those whose middles are nearer to it than the brush's radius; ascending.
     fn touched(
         &mut self,
-        (path, radius): (&[Point<D>], f64),
+        Stroke { path, radius, .. }: Stroke<'_, D>,
         watch: &mut dyn Watch,
     ) -> Result<Vec<u32>, JobError> {
         if !(0.0..=1e9).contains(&radius) {
@@ -295,7 +314,8 @@ fn middles<const D: usize>(outcome: &Outcome<D>, moves: &AtomMoves<D>) -> Vec<Po
 
 fn is_near<const D: usize>(p: &Point<D>, path: &[Point<D>], radius: f64) -> bool {
     let near = |from: &Point<D>, to: &Point<D>| {
-        let is_in = |k: usize| p[k] >= from[k].min(to[k]) - radius && p[k] <= from[k].max(to[k]) + radius;
+        let is_in =
+            |k: usize| p[k] >= from[k].min(to[k]) - radius && p[k] <= from[k].max(to[k]) + radius;
         (0..D).all(is_in) && distance_to_segment(p, from, to) < radius
     };
     match path {

@@ -672,7 +672,7 @@ fn regions_are_painted_over_parts_and_are_there_after_a_reload() {
     assert!(tab.picture().count(low, high, is_warm) > 2000);
     // and undone, it is not
     (0..3).for_each(|_| tab.key("z", CTRL));
-    tab.until("studio.model.regions.length === 0 && !studio.state.busy && !studio.views[0].regions");
+    tab.until("studio.model.regions.length === 0 && !studio.state.busy && !studio.views[0].regions?.groups.length");
     tab.frame();
     assert_eq!(tab.picture().count(low, high, is_warm), 0);
     assert_eq!(tab.complaints(), Vec::<String>::new());

@@ -39,34 +39,35 @@ fn thickest(layers: &Layers<3>, of_samples: &[usize]) -> Vec<usize> {
     of_samples.iter().for_each(|layer| counts[*layer] += 1);
     let mut inside: Vec<(f64, usize)> = (1..layers.horizons.len())
         .map(|layer| (layers.horizons[layer] - layers.horizons[layer - 1], layer))
-        .filter(|(thickness, layer)| {
-            counts[*layer] as f64 > 0.9 * thickness * (SIDE * SIDE) as f64
-        })
+        .filter(|(thickness, layer)| counts[*layer] as f64 > 0.9 * thickness * (SIDE * SIDE) as f64)
         .collect();
     inside.sort_by(|a, b| b.0.total_cmp(&a.0));
-    println!("{inside:?}");
     let mut chosen: Vec<usize> = inside.into_iter().take(6).map(|(_, layer)| layer).collect();
     chosen.sort_unstable();
     chosen
 }
 
-/// Strokes along the middle of a layer: a polyline on each of a few slices normal to y, a place every so many samples.
-fn strokes(layers: &Layers<3>, layer: usize, slices: &[usize], apart: usize) -> Vec<Vec<[f64; 3]>> {
-    let middle = (layers.horizons[layer - 1] + layers.horizons[layer]) / 2.0;
-    let last = SIDE - 1;
-    slices
-        .iter()
-        .map(|y| {
-            let place = |x: usize| -> Option<[f64; 3]> {
-                // the sample nearest to the middle, as a hand would find it
-                let off = |z: usize| (layers.age(&[x as f64, *y as f64, z as f64]) - middle).abs();
-                let z = (0..SIDE).min_by(|a, b| off(*a).total_cmp(&off(*b)))?;
-                (off(z) < 1.0).then_some([x as f64, *y as f64, z as f64])
-            };
-            (0..SIDE).step_by(apart).chain([last]).filter_map(place).collect()
-        })
-        .collect()
+/// Strokes along a layer at a depth within it, as a share of its thickness, up and down by another share: a polyline on each of
+/// five slices normal to y. Where faults cut the layer the hand follows it to the other side.
+fn strokes(layers: &Layers<3>, layer: usize, depth: f64, swing: f64) -> Vec<Value> {
+    let (top, bottom) = (layers.horizons[layer - 1], layers.horizons[layer]);
+    let place = |x: usize, y: usize| -> Option<Value> {
+        let turn = if (x / APART).is_multiple_of(2) { swing } else { -swing };
+        let age = top + (depth + turn) * (bottom - top);
+        let off = |z: usize| (layers.age(&[x as f64, y as f64, z as f64]) - age).abs();
+        let z = (0..SIDE).min_by(|a, b| off(*a).total_cmp(&off(*b)))?;
+        (off(z) < 1.0).then(|| json!([x, y, z]))
+    };
+    let along =
+        |y: usize| (0..SIDE).step_by(APART).chain([SIDE - 1]).filter_map(|x| place(x, y)).collect();
+    (0..5).map(|i| along(8 + 20 * i)).collect()
 }
+
+/// The brush's radius.
+const RADIUS: f64 = 1.5;
+
+/// Samples from one place of a stroke to the next.
+const APART: usize = 4;
 
 /// Dice's coefficient of each layer and its region: 2 |A ∩ B| / (|A| + |B|), by samples.
 fn dice(path: &Path, layers: &[usize], of_samples: &[usize]) -> Vec<f64> {
@@ -90,38 +91,53 @@ fn dice(path: &Path, layers: &[usize], of_samples: &[usize]) -> Vec<f64> {
     layers.iter().enumerate().map(|(i, layer)| of(i + 1, *layer)).collect()
 }
 
+/// Six layers of a volume, painted by 51 gestures at places that a hand would choose. Each of these layers lies between a dark
+/// and a bright horizon: what two of them hold is painted on a mesh that follows dark ones, and parted on one that follows
+/// bright ones, each stroke over the one region that it is about.
+///
+/// What is reached is a snapshot, by samples: a mean of 0.8. Borders are right to a tenth of a sample; what is missed are
+/// parts that no stroke touches, and what is too much are parts that reach through gaps where faults cut horizons.
 #[test]
 fn layers_are_painted_by_a_few_strokes() {
+    const LEVEL: usize = 400;
     let folder = tempfile::tempdir().unwrap();
     let path = folder.path().join("session");
-    let var = |name: &str, other: &str| std::env::var(name).unwrap_or(other.into());
     let options = SynthOptions { seed: 3, ..SynthOptions::new([SIDE; 3]) };
     let layers = synthesize(Scene::Layers, &options).unwrap().truth.layers.unwrap();
     let of_samples = layers_of_samples(&layers);
     let chosen = thickest(&layers, &of_samples);
-    let t = std::time::Instant::now();
     let mut session = Session::open(&path, &mut Silent).unwrap();
-    let run = RunConfig::parse(&var("TOML", "[lattice]\nsize = 6.0\n[features]\nfeatures = \"horizons\"\n").replace(';', "\n")).unwrap();
+    let options = "[lattice]\nsize = 5.0\n[features]\nfeatures = \"horizons\"\npolarity = \"dark\"\n\
+                   high = 0.25\nlow = 0.1\n";
     let source = Source::Scene { name: "layers".into(), seed: 3 };
+    let run = RunConfig::parse(options).unwrap();
     session.open_image(source, run, &mut Silent).unwrap();
-    let file = folder.path().join("mesh.vtu");
-    session.write(&file, &mut Silent).unwrap();
-    println!("mesh {:?}", t.elapsed());
-    let level: usize = var("LEVEL", "256").parse().unwrap();
-    let slices: Vec<usize> = var("SLICES", "8,24,40,56,72,88").split(',').map(|s| s.parse().unwrap()).collect();
     let mut count = 0;
-    for (region, layer) in (1..).zip(&chosen) {
-        for path in strokes(&layers, *layer, &slices, 6) {
-            act(&mut session, json!({ "do": "region", "region": region, "radius": 0.0, "path": path, "parts": level }));
-            if count == 0 { println!("tree {:?}", t.elapsed()); }
+    let mut paint = |session: &mut Session, region: usize, over: Option<usize>, layer: usize| {
+        for path in strokes(&layers, layer, 0.5, 0.3) {
+            let stroke = json!({ "do": "region", "region": region, "radius": RADIUS, "path": path, "parts": LEVEL, "over": over });
+            act(session, stroke);
             count += 1;
         }
+    };
+    for (region, i) in [(1, 0), (2, 1), (2, 2), (4, 3), (5, 4), (5, 5)] {
+        paint(&mut session, region, None, chosen[i]);
     }
-    println!("painted {:?} {count}", t.elapsed());
+    let bright = json!({ "do": "set", "option": "features.polarity", "value": "bright" });
+    act(&mut session, bright);
+    let beyond =
+        [(0, 1, chosen[0] + 1), (3, 2, chosen[2]), (0, 4, chosen[3] + 1), (6, 5, chosen[5])];
+    for (region, over, layer) in beyond {
+        paint(&mut session, region, Some(over), layer);
+    }
+    assert!(count < 60, "{count} strokes");
+    let file = folder.path().join("mesh.vtu");
     session.write(&file, &mut Silent).unwrap();
     let found = dice(&file, &chosen, &of_samples);
-    println!("{chosen:?} {found:?} mean {}", found.iter().sum::<f64>() / 6.0);
-    println!("{:?}", t.elapsed());
+    let mean = found.iter().sum::<f64>() / 6.0;
+    println!("Dice {found:.3?}, mean {mean:.3}");
+    assert!(mean > 0.75, "{found:?}");
+    drop(session);
     let again = folder.path().join("again.vtu");
     replay(&path.join("log.jsonl"), &again, &mut Silent).unwrap();
     assert!(std::fs::read(&file).unwrap() == std::fs::read(&again).unwrap(), "as the log has it");
@@ -174,13 +190,17 @@ fn regions_are_undone_redone_replayed_and_exported_with_their_names() {
         let bytes = exported(&mut session, folder, &format!("all.{format}"));
         if ["inp", "msh", "msh2"].contains(&format) {
             let text = String::from_utf8_lossy(&bytes);
-            assert!(["sand", "region-1", "rest"].iter().all(|name| text.contains(name)), "{format}");
+            assert!(
+                ["sand", "region-1", "rest"].iter().all(|name| text.contains(name)),
+                "{format}"
+            );
         }
         let again = folder.join(format!("again.{format}"));
         replay(&folder.join("session/log.jsonl"), &again, &mut Silent).unwrap();
         assert!(bytes == std::fs::read(&again).unwrap(), "replayed as {format}");
     }
-    let names: Vec<String> = cells_of_regions(&mut session, folder).into_iter().map(|r| r.0).collect();
+    let names: Vec<String> =
+        cells_of_regions(&mut session, folder).into_iter().map(|r| r.0).collect();
     assert_eq!(names, ["rest", "region-1", "sand"]);
     let all = exported(&mut session, folder, "all.vtu");
     (0..5).for_each(|_| session.undo(&mut Silent).unwrap());
@@ -209,7 +229,11 @@ fn regions_go_with_their_atoms_and_stay_when_atoms_are_made_again() {
     let edited = share(&cells_of_regions(&mut session, folder));
     assert!((edited - whole).abs() < 0.05, "{whole} {edited}");
     // other atoms altogether
-    for (option, value) in [("lattice.size", json!(3.5)), ("lattice.mesh", json!("voronoi")), ("lattice.mesh", Value::Null)] {
+    for (option, value) in [
+        ("lattice.size", json!(3.5)),
+        ("lattice.mesh", json!("voronoi")),
+        ("lattice.mesh", Value::Null),
+    ] {
         act(&mut session, json!({ "do": "set", "option": option, "value": value }));
     }
     let other = share(&cells_of_regions(&mut session, folder));
@@ -234,12 +258,18 @@ fn parts_are_merged_and_split_by_strokes() {
     let (a, b) = (count(&mut session, above), count(&mut session, below));
     act(&mut session, json!({ "do": "merge-parts", "path": [above, below], "parts": 4 }));
     assert!(count(&mut session, above) >= a + b, "they are one");
-    act(&mut session, json!({ "do": "split-part", "first": [[12.0, 8.0], [30.0, 8.0]], "second": [[12.0, 40.0], [30.0, 40.0]], "parts": 4 }));
+    act(
+        &mut session,
+        json!({ "do": "split-part", "first": [[12.0, 8.0], [30.0, 8.0]], "second": [[12.0, 40.0], [30.0, 40.0]], "parts": 4 }),
+    );
     let (again, other) = (count(&mut session, above), count(&mut session, below));
     assert!(again.abs_diff(a) < a / 5 && other.abs_diff(b) < b / 5, "{a} {b} {again} {other}");
     for (gesture, why) in [
         (json!({ "do": "merge-parts", "path": [above], "parts": 4 }), "one part"),
-        (json!({ "do": "split-part", "first": [above], "second": [below], "parts": 4 }), "two sides"),
+        (
+            json!({ "do": "split-part", "first": [above], "second": [below], "parts": 4 }),
+            "two sides",
+        ),
         (json!({ "do": "split-part", "first": [], "second": [], "parts": 4 }), "two sides"),
         (stroke(65, json!([above]), None), "region 65"),
         (json!({ "do": "name-region", "region": 1, "name": "xmin" }), "something else"),
