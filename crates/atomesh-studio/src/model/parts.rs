@@ -17,7 +17,11 @@ use atomesh_job::{JobError, Session};
 use super::Model;
 
 /// Parts of the finest level, at most.
-pub const MOST_PARTS: usize = 256;
+pub const MOST_PARTS: usize = 512;
+
+/// The multiplier of the weights of features' facets, in place of the command's 0: where a gap in a feature lets cells on its
+/// two sides hang together, walls would part all but these, and leave no parts to cut them apart.
+const WALL: f64 = 0.02;
 
 /// Places along a stroke at which cells are looked at, over the least nominal distance.
 const STEP: f64 = 0.25;
@@ -64,7 +68,8 @@ impl<const D: usize> Model<D> {
             properties: &[],
             regions: None,
         };
-        let request = ClustersRequest { parts: MOST_PARTS, ..ClustersRequest::default() };
+        let request =
+            ClustersRequest { parts: MOST_PARTS, multiplier: WALL, ..ClustersRequest::default() };
         let mut session = Session::new(watch);
         let facets = facets_of_outcome(&request, &made, &self.axes.dimension, &mut session)?;
         let cells = outcome.cells().map_or(outcome.mesh().cell_count(), |c| c.cell_count());

@@ -47,23 +47,27 @@ fn thickest(layers: &Layers<3>, of_samples: &[usize]) -> Vec<usize> {
     chosen
 }
 
-/// Strokes along the middle of a layer: a polyline on each of a few slices normal to y, a place every so many samples.
-fn strokes(layers: &Layers<3>, layer: usize, slices: &[usize], apart: usize) -> Vec<Vec<[f64; 3]>> {
-    let middle = (layers.horizons[layer - 1] + layers.horizons[layer]) / 2.0;
-    let last = SIDE - 1;
-    slices
-        .iter()
-        .map(|y| {
-            let place = |x: usize| -> Option<[f64; 3]> {
-                // the sample nearest to the middle, as a hand would find it
-                let off = |z: usize| (layers.age(&[x as f64, *y as f64, z as f64]) - middle).abs();
-                let z = (0..SIDE).min_by(|a, b| off(*a).total_cmp(&off(*b)))?;
-                (off(z) < 1.0).then_some([x as f64, *y as f64, z as f64])
-            };
-            (0..SIDE).step_by(apart).chain([last]).filter_map(place).collect()
-        })
-        .collect()
+/// Strokes along a layer at a depth within it, as a share of its thickness, up and down by another share: a polyline on each of
+/// five slices normal to y. Where faults cut the layer the hand follows it to the other side.
+fn strokes(layers: &Layers<3>, layer: usize, depth: f64, swing: f64) -> Vec<Value> {
+    let (top, bottom) = (layers.horizons[layer - 1], layers.horizons[layer]);
+    let place = |x: usize, y: usize| -> Option<Value> {
+        let turn = if (x / APART).is_multiple_of(2) { swing } else { -swing };
+        let age = top + (depth + turn) * (bottom - top);
+        let off = |z: usize| (layers.age(&[x as f64, y as f64, z as f64]) - age).abs();
+        let z = (0..SIDE).min_by(|a, b| off(*a).total_cmp(&off(*b)))?;
+        (off(z) < 1.0).then(|| json!([x, y, z]))
+    };
+    let along =
+        |y: usize| (0..SIDE).step_by(APART).chain([SIDE - 1]).filter_map(|x| place(x, y)).collect();
+    (0..5).map(|i| along(8 + 20 * i)).collect()
 }
+
+/// The brush's radius.
+const RADIUS: f64 = 1.5;
+
+/// Samples from one place of a stroke to the next.
+const APART: usize = 4;
 
 /// Dice's coefficient of each layer and its region: 2 |A ∩ B| / (|A| + |B|), by samples.
 fn dice(path: &Path, layers: &[usize], of_samples: &[usize]) -> Vec<f64> {
@@ -87,13 +91,16 @@ fn dice(path: &Path, layers: &[usize], of_samples: &[usize]) -> Vec<f64> {
     layers.iter().enumerate().map(|(i, layer)| of(i + 1, *layer)).collect()
 }
 
-/// What 36 strokes reach: the mean is far from what a hand with more patience does, as parts pass from a layer to the next
-/// where horizons of one polarity are found alone.
-const LEAST_DICE: f64 = 0.65;
-
+/// Six layers of a volume, painted by 51 gestures at places that a hand would choose. Each of these layers lies between a dark
+/// and a bright horizon: what two of them hold is painted on a mesh that follows dark ones, and parted on one that follows
+/// bright ones, each stroke over the one region that it is about.
+///
+/// What is reached is a snapshot, by samples: a mean of 0.8. Borders are right to a tenth of a sample; what is missed are
+/// parts that no stroke touches, and what is too much are parts that reach through gaps where faults cut horizons.
 #[test]
-#[ignore = "a minute and a half, most of it the distances of samples to the mesh"]
+#[ignore = "minutes"]
 fn layers_are_painted_by_a_few_strokes() {
+    const LEVEL: usize = 400;
     let folder = tempfile::tempdir().unwrap();
     let path = folder.path().join("session");
     let options = SynthOptions { seed: 3, ..SynthOptions::new([SIDE; 3]) };
@@ -101,21 +108,37 @@ fn layers_are_painted_by_a_few_strokes() {
     let of_samples = layers_of_samples(&layers);
     let chosen = thickest(&layers, &of_samples);
     let mut session = Session::open(&path, &mut Silent).unwrap();
-    let run = "[lattice]\nsize = 6.0\n[features]\nfeatures = \"horizons\"\n";
-    let run = RunConfig::parse(run).unwrap();
+    let options = "[lattice]\nsize = 5.0\n[features]\nfeatures = \"horizons\"\npolarity = \"dark\"\n\
+                   high = 0.25\nlow = 0.1\n";
     let source = Source::Scene { name: "layers".into(), seed: 3 };
+    let run = RunConfig::parse(options).unwrap();
     session.open_image(source, run, &mut Silent).unwrap();
-    let file = folder.path().join("mesh.vtu");
-    for (region, layer) in (1..).zip(&chosen) {
-        for path in strokes(&layers, *layer, &[8, 24, 40, 56, 72, 88], 6) {
-            let stroke = json!({ "do": "region", "region": region, "radius": 0.0, "path": path, "parts": 256 });
-            act(&mut session, stroke);
+    let mut count = 0;
+    let mut paint = |session: &mut Session, region: usize, over: Option<usize>, layer: usize| {
+        for path in strokes(&layers, layer, 0.5, 0.3) {
+            let stroke = json!({ "do": "region", "region": region, "radius": RADIUS, "path": path, "parts": LEVEL, "over": over });
+            act(session, stroke);
+            count += 1;
         }
+    };
+    for (region, i) in [(1, 0), (2, 1), (2, 2), (4, 3), (5, 4), (5, 5)] {
+        paint(&mut session, region, None, chosen[i]);
     }
+    let bright = json!({ "do": "set", "option": "features.polarity", "value": "bright" });
+    act(&mut session, bright);
+    let beyond =
+        [(0, 1, chosen[0] + 1), (3, 2, chosen[2]), (0, 4, chosen[3] + 1), (6, 5, chosen[5])];
+    for (region, over, layer) in beyond {
+        paint(&mut session, region, Some(over), layer);
+    }
+    assert!(count < 60, "{count} strokes");
+    let file = folder.path().join("mesh.vtu");
     session.write(&file, &mut Silent).unwrap();
     let found = dice(&file, &chosen, &of_samples);
-    let mean = found.iter().sum::<f64>() / found.len() as f64;
-    assert!(mean > LEAST_DICE, "{mean} of {found:?}");
+    let mean = found.iter().sum::<f64>() / 6.0;
+    println!("Dice {found:.3?}, mean {mean:.3}");
+    assert!(mean > 0.75, "{found:?}");
+    drop(session);
     let again = folder.path().join("again.vtu");
     replay(&path.join("log.jsonl"), &again, &mut Silent).unwrap();
     assert!(std::fs::read(&file).unwrap() == std::fs::read(&again).unwrap(), "as the log has it");
