@@ -667,8 +667,9 @@ fn regions_are_painted_over_parts_and_are_there_after_a_reload() {
     assert!(legend.as_str().unwrap().contains("sand"), "{legend}");
     // reloaded, it is there
     let before = tab.value("studio.model.regions");
-    tab.value("window.isOld = true; location.reload()");
-    tab.until("!window.isOld && window.studio && studio.model?.regions.length === 2 && studio.views[0]?.regions?.groups.length === 2");
+    tab.value("window.isOld = true");
+    tab.call("Page.reload", json!({}));
+    tab.until("document.readyState === 'complete' && !window.isOld && window.studio && studio.model?.regions.length === 2 && studio.views[0]?.regions?.groups.length === 2");
     assert_eq!(tab.value("studio.model.regions"), before);
     tab.settle();
     tab.frame();
