@@ -7,6 +7,7 @@ use atomesh::features::{FacetField, FeatureFaces};
 use atomesh::geometry::{Bounds, Point};
 use atomesh::image::{Frame, Image};
 use atomesh::mesh::{Regions, Tags, is_feature_name};
+use atomesh::run::Outcome;
 use atomesh_io::mesh::cells::LoadedCells;
 use atomesh_io::mesh::{LoadedMesh, MeshFormat, Provenance};
 
@@ -16,7 +17,6 @@ use crate::error::JobError;
 use crate::features;
 use crate::files::check_voronoi;
 use crate::in_samples::InSamples;
-use crate::mesh::MadeMesh;
 use crate::sample::{Property, SampledMesh};
 use crate::session::Session;
 
@@ -147,7 +147,7 @@ impl<const D: usize> ClusteredMesh<D> for LoadedMesh<D> {
 
 /// The facets between cells of triangles or tetrahedra, with b along them where it is known; those that the mesh names as
 /// features have the request's multiplier.
-pub fn facets_of_mesh<const D: usize>(
+fn facets_of_mesh<const D: usize>(
     request: &ClustersRequest,
     loaded: &LoadedMesh<D>,
     field: Option<&FacetField<D>>,
@@ -161,23 +161,19 @@ pub fn facets_of_mesh<const D: usize>(
     (dimension.tools.shared_facets)(&loaded.mesh, field, &groups)
 }
 
-/// The facets between the cells of a mesh that a run has made, with the run's own b along them, which is known between points
-/// too; those that it names as features have the request's multiplier.
+/// The facets between the triangles or tetrahedra that a run has made, `loaded` as files have them, with the run's own b along
+/// them, which is known between points too; those that it names as features have the request's multiplier.
 ///
 /// # Errors
 /// [`JobError`] if the watch ends the work.
 pub fn facets_of_outcome<const D: usize>(
     request: &ClustersRequest,
-    made: &MadeMesh<'_, D>,
+    (outcome, loaded): (&Outcome<D>, &LoadedMesh<D>),
     dimension: &Dimension<D>,
     session: &mut Session<'_>,
 ) -> Result<Vec<SharedFacet>, JobError> {
-    if let Some(cells) = made.loaded_cells() {
-        return cells.facets(request, None, dimension, session);
-    }
-    let outcome = made.outcome;
     let field = (dimension.tools.field_along)(outcome.mesh(), outcome.potential(), session)?;
-    Ok(facets_of_mesh(request, &made.loaded()?, Some(&field), dimension))
+    Ok(facets_of_mesh(request, loaded, Some(&field), dimension))
 }
 
 impl<const D: usize> ClusteredMesh<D> for LoadedCells<D> {

@@ -23,7 +23,7 @@ use crate::options::{FrameOptions, PotentialOptions, View};
 use crate::session::Session;
 #[cfg(feature = "clap")]
 use crate::values::{count_in, named, number_in};
-pub use mesh::{ClusteredMesh, facets_of_mesh, facets_of_outcome};
+pub use mesh::{ClusteredMesh, facets_of_outcome};
 
 /// A mesh, the image whose features part its cells, and where it goes.
 #[derive(Clone, Debug, PartialEq)]

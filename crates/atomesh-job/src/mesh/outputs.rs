@@ -123,6 +123,11 @@ impl Outputs {
         self.picture.is_some() || self.movie.is_some()
     }
 
+    /// Whether the picture shows groups of facets or regions.
+    pub fn shows_tags(&self) -> bool {
+        self.picture.is_some() && self.view != View::Slices
+    }
+
     /// Whether the image is still needed after the atoms have felt it.
     pub fn needs_image(&self) -> bool {
         self.is_drawn() || self.needs_report()

@@ -34,6 +34,13 @@ pub struct Tagged {
     pub facets: usize,
 }
 
+/// Triangles or tetrahedra of the world, their groups of facets and regions, and what of these was tagged.
+struct TaggedMesh<const D: usize> {
+    mesh: Mesh<D>,
+    tags: Tags<D>,
+    tagged: Option<Tagged>,
+}
+
 /// A mesh to be written.
 pub(super) struct Writing<'a, const D: usize> {
     pub run: &'a RunConfig,
@@ -60,10 +67,15 @@ impl<const D: usize> Writing<'_, D> {
         image: Option<&Image<D>>,
         session: &mut Session<'_>,
     ) -> Result<Option<Tagged>, JobError> {
+        let mut mesh = None;
         if let (true, Some(image)) = (self.outputs.is_drawn(), image) {
             session.begin(Phase::Draw);
+            if self.outputs.shows_tags() && self.outcome.cells().is_none() {
+                mesh = Some(self.tagged_mesh(session)?);
+            }
             let backdrop = self.backdrop()?;
-            self.draw(backdrop.as_ref().unwrap_or(image), session)?;
+            let tags = mesh.as_ref().map(|mesh| &mesh.tags);
+            self.draw(backdrop.as_ref().unwrap_or(image), tags, session)?;
         }
         session.begin(Phase::Write);
         if let Some(path) = &self.outputs.potential {
@@ -71,13 +83,21 @@ impl<const D: usize> Writing<'_, D> {
         }
         let provenance = self.run.provenance::<D>().in_world(self.world);
         match self.outputs.format {
-            OutputFormat::Simplices(format) => self.write_simplices(format, &provenance, session),
+            OutputFormat::Simplices(format) => {
+                let mesh = mesh.map_or_else(|| self.tagged_mesh(session), Ok)?;
+                self.write_simplices(format, mesh, &provenance, session)
+            }
             _ => self.write_voronoi(&provenance, session).map(|()| None),
         }
     }
 
-    /// Draws the picture and the movie over that image.
-    fn draw(&self, image: &Image<D>, session: &mut Session<'_>) -> Result<(), JobError> {
+    /// Draws the picture and the movie over that image; `tags` are those of triangles or tetrahedra, if they are to be seen.
+    fn draw(
+        &self,
+        image: &Image<D>,
+        tags: Option<&Tags<D>>,
+        session: &mut Session<'_>,
+    ) -> Result<(), JobError> {
         let style = self.style();
         if let Some(file) = &self.outputs.picture {
             let picture = match (self.outputs.view, self.outcome.sample_cells()) {
@@ -89,7 +109,7 @@ impl<const D: usize> Writing<'_, D> {
                     (self.dimension.drawing.mesh)(image, &self.outcome.sample_mesh(), &style)
                         .map_err(JobError::content)?
                 }
-                (view, cells) => self.in_space(view, cells.as_ref(), image, session)?,
+                (view, cells) => self.in_space(view, (cells.as_ref(), tags), image, session)?,
             };
             file.write(&picture)?;
         }
@@ -104,37 +124,38 @@ impl<const D: usize> Writing<'_, D> {
     fn in_space(
         &self,
         view: View,
-        cells: Option<&PolyMesh<D>>,
+        (cells, tags): (Option<&PolyMesh<D>>, Option<&Tags<D>>),
         image: &Image<D>,
         session: &mut Session<'_>,
     ) -> Result<Picture, JobError> {
-        let mesh = self.outcome.sample_mesh();
-        let (groups, regions) = match cells {
-            Some(cells) => {
-                let features = self.outcome.cell_features().unwrap_or_default();
-                (feature_groups(cells, &features), None)
+        let cells_cut_away = view == View::CutAway;
+        let groups = match (cells, tags) {
+            // surfaces would hide where cells are cut
+            _ if cells_cut_away => Vec::new(),
+            (Some(cells), _) => {
+                feature_groups(cells, &self.outcome.cell_features().unwrap_or_default())
             }
-            None => {
-                let (tags, _) = self.tags(&self.outcome.world_mesh(), session)?;
-                (tags.facet_groups().to_vec(), tags.regions().cloned())
-            }
+            (None, tags) => tags.map_or_else(Vec::new, |tags| tags.facet_groups().to_vec()),
         };
-        let parts = regions.map(|regions| regions.of_cells).unwrap_or_default();
-        // surfaces would hide where cells are cut
-        let sheets = if view == View::Space { sheets(groups) } else { Vec::new() };
-        if sheets.is_empty() && view == View::Space {
+        let sheets = sheets(groups);
+        if sheets.is_empty() && !cells_cut_away {
             let text = "no facets are tagged: the picture shows slices alone";
-            session.warn(self.outputs.picture.as_ref().map(|file| file.path.as_path()), text);
+            session.warn(self.run.input.shown(), text);
         }
+        let regions = tags.and_then(Tags::regions);
+        let mesh;
         let contents = SpacePicture {
             cells: match cells {
                 Some(cells) => FlowCells::Polytopes(cells),
-                None => FlowCells::Simplices(&mesh),
+                None => {
+                    mesh = self.outcome.sample_mesh();
+                    FlowCells::Simplices(&mesh)
+                }
             },
             image: Some(image),
             sheets: &sheets,
-            parts: &parts,
-            cells_cut_away: view == View::CutAway,
+            parts: regions.map_or(&[], |regions| &regions.of_cells),
+            cells_cut_away,
         };
         draw_in_space(&contents, &self.style(), self.dimension)
     }
@@ -166,13 +187,11 @@ impl<const D: usize> Writing<'_, D> {
     fn write_simplices(
         &self,
         format: MeshFormat,
+        TaggedMesh { mesh, tags, tagged }: TaggedMesh<D>,
         provenance: &Provenance,
         session: &mut Session<'_>,
     ) -> Result<Option<Tagged>, JobError> {
         let outcome = self.outcome;
-        let mesh = outcome.world_mesh();
-        // no mesh leaves that is none, whatever went wrong before
-        mesh.validate().map_err(|fault| self.not_valid(fault))?;
         let quadratic = self.outputs.is_quadratic.then(|| outcome.quadratic());
         let at_nodes = |values: &[f32]| match &quadratic {
             Some(quadratic) => quadratic.extend(values),
@@ -186,10 +205,6 @@ impl<const D: usize> Writing<'_, D> {
         let labels = labels.map(as_values);
         let regions = self.regions.filter(|_| !self.outputs.format.holds_tags());
         let regions = regions.map(|regions| as_values(&regions.of_cells));
-        let (mut tags, tagged) = self.tags(&mesh, session)?;
-        if let Some(regions) = self.regions {
-            tags = replaced(&tags, &mesh, regions)?;
-        }
         if let Some(sections) = &self.outputs.sections {
             check_sections::<D>(sections, tags.regions(), session)?;
         }
@@ -223,6 +238,18 @@ impl<const D: usize> Writing<'_, D> {
         JobError::content(format!("the mesh would not be valid: {fault}"))
             .advise("this is a fault of atomesh's own; another --size or --seed may avoid it")
             .about_any(self.run.input.shown())
+    }
+
+    /// The mesh with its tags.
+    fn tagged_mesh(&self, session: &mut Session<'_>) -> Result<TaggedMesh<D>, JobError> {
+        let mesh = self.outcome.world_mesh();
+        // no mesh leaves that is none, whatever went wrong before
+        mesh.validate().map_err(|fault| self.not_valid(fault))?;
+        let (mut tags, tagged) = self.tags(&mesh, session)?;
+        if let Some(regions) = self.regions {
+            tags = replaced(&tags, &mesh, regions)?;
+        }
+        Ok(TaggedMesh { mesh, tags, tagged })
     }
 
     /// The sides of the box, outline and labels, and the features if they are asked for.

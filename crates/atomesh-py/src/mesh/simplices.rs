@@ -5,7 +5,7 @@ use atomesh::mesh::{FacetGroup, Regions};
 use atomesh_draw::Style;
 use atomesh_io::image::AnyImage;
 use atomesh_io::mesh::{LoadedMesh, OwnedField};
-use atomesh_job::clusters::{ClustersRequest, clusters, clusters_of_facets, facets_of_mesh};
+use atomesh_job::clusters::{ClustersRequest, clusters, clusters_of_facets, facets_of_outcome};
 use atomesh_job::features::FeaturesRequest;
 use atomesh_job::flow::{FlowMesh, FlowOptions};
 use atomesh_job::measure::measure;
@@ -167,11 +167,7 @@ impl<const D: usize> Body for SimplexBody<D> {
         let (Some(made), None) = (made, &image) else {
             return Ok(clusters(request, loaded, image, dimension, session)?.parts);
         };
-        // the run's own b, which is known between points too
-        let outcome = &made.outcome;
-        let field = dimension.tools.field_along;
-        let field = field(outcome.mesh(), outcome.potential(), session)?;
-        let facets = facets_of_mesh(request, loaded, Some(&field), dimension);
+        let facets = facets_of_outcome(request, (&made.outcome, loaded), dimension, session)?;
         let cell_count = loaded.mesh.cell_count();
         Ok(clusters_of_facets(request, cell_count, &facets, true, session)?.parts)
     }

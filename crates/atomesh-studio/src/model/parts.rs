@@ -10,7 +10,9 @@ use atomesh::cluster::{CellGraph, ClusterTree, merge_parts, split_part};
 use atomesh::geometry::Point;
 use atomesh::region::CellFinder;
 use atomesh::watch::Watch;
-use atomesh_job::clusters::{ClustersRequest, clusters_of_facets, facets_of_outcome};
+use atomesh_job::clusters::{
+    ClusteredMesh, ClustersRequest, clusters_of_facets, facets_of_outcome,
+};
 use atomesh_job::mesh::MadeMesh;
 use atomesh_job::{JobError, Session};
 
@@ -71,7 +73,14 @@ impl<const D: usize> Model<D> {
         let request =
             ClustersRequest { parts: MOST_PARTS, multiplier: WALL, ..ClustersRequest::default() };
         let mut session = Session::new(watch);
-        let facets = facets_of_outcome(&request, &made, &self.axes.dimension, &mut session)?;
+        let dimension = &self.axes.dimension;
+        let facets = match made.loaded_cells() {
+            Some(cells) => cells.facets(&request, None, dimension, &mut session)?,
+            None => {
+                let own = (&*outcome, &made.loaded()?);
+                facets_of_outcome(&request, own, dimension, &mut session)?
+            }
+        };
         let cells = outcome.cells().map_or(outcome.mesh().cell_count(), |c| c.cell_count());
         let graph = CellGraph::of_facets(cells, &facets, request.contrast)?;
         let tree = clusters_of_facets(&request, cells, &facets, true, &mut session)?.tree;
