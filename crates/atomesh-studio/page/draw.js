@@ -228,15 +228,7 @@ export class Drawing {
    * @param {number[]} ink red, green, blue, opacity
    */
   edges(name, places, edges, to, ink) {
-    if (edges.length === 0) return;
-    const { gl } = this;
-    const { program, at } = this.programs.lines;
-    this.array();
-    this.use(program, at, to);
-    gl.uniform4fv(at("ink"), ink);
-    this.places(`${name} places`, places);
-    this.buffer(`${name} edges`, gl.ELEMENT_ARRAY_BUFFER, edges);
-    gl.drawElements(gl.LINES, edges.length, gl.UNSIGNED_INT, 0);
+    this.elements(this.gl.LINES, name, places, edges, to, ink);
   }
 
   /**
@@ -248,15 +240,23 @@ export class Drawing {
    * @param {number[]} ink
    */
   triangles(name, places, corners, to, ink) {
-    if (corners.length === 0) return;
-    const { gl } = this;
+    this.elements(this.gl.TRIANGLES, name, places, corners, to, ink);
+  }
+
+  elements(mode, name, places, numbers, to, ink) {
+    if (numbers.length === 0) return;
+    this.setUp(name, places, to, ink);
+    this.buffer(`${name} elements`, this.gl.ELEMENT_ARRAY_BUFFER, numbers);
+    this.gl.drawElements(mode, numbers.length, this.gl.UNSIGNED_INT, 0);
+  }
+
+  /** Sets up what is drawn in one ink between places. */
+  setUp(name, places, to, ink) {
     const { program, at } = this.programs.lines;
     this.array();
     this.use(program, at, to);
-    gl.uniform4fv(at("ink"), ink);
+    this.gl.uniform4fv(at("ink"), ink);
     this.places(`${name} places`, places);
-    this.buffer(`${name} corners`, gl.ELEMENT_ARRAY_BUFFER, corners);
-    gl.drawElements(gl.TRIANGLES, corners.length, gl.UNSIGNED_INT, 0);
   }
 
   places(name, places) {
@@ -270,11 +270,7 @@ export class Drawing {
   /** Draws polylines of so many places each. */
   strips(name, places, lengths, to, ink) {
     const { gl } = this;
-    const { program, at } = this.programs.lines;
-    this.array();
-    this.use(program, at, to);
-    gl.uniform4fv(at("ink"), ink);
-    this.places(`${name} places`, places);
+    this.setUp(name, places, to, ink);
     let start = 0;
     for (const length of lengths) {
       gl.drawArrays(gl.LINE_STRIP, start, length);

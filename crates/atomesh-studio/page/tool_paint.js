@@ -1,5 +1,10 @@
 // Tools 2 and 3: painting d(x) and β(x) with a soft round brush. Ctrl erases to automatic.
 
+import { Stroke } from "./stroke.js";
+
+/** Places in a stroke. */
+const MOST = 4000;
+
 export class Paint {
   /**
    * @param {any} app
@@ -9,6 +14,7 @@ export class Paint {
     this.app = app;
     this.field = field;
     this.radius = 0;
+    this.stroke = new Stroke(MOST);
     this.value = field === "size" ? 0 : 1;
     this.hint = "Drag to paint; Ctrl + drag erases; [ and ] change the brush.";
   }
@@ -33,37 +39,23 @@ export class Paint {
   }
 
   down(view, event) {
-    this.path = [view.toSamples(event.offsetX, event.offsetY)];
-    this.pathView = view;
-    this.erases = event.ctrlKey || event.metaKey;
+    this.stroke.begin(view, event);
     this.app.redraw();
   }
 
   move(view, event) {
-    this.over = { view, at: view.toSamples(event.offsetX, event.offsetY) };
-    if (this.path) {
-      const last = view.toPixels(this.path[this.path.length - 1]);
-      const apart = Math.hypot(last[0] - event.offsetX, last[1] - event.offsetY);
-      if (apart > 3 && this.path.length < 4000) this.path.push(this.over.at);
-    }
+    this.stroke.follow(view, event);
     this.app.redraw();
   }
 
   up(view) {
-    if (!this.path) return;
-    const path = this.path.map((s) => view.place(s));
-    const value = this.erases ? null : this.value;
-    this.path = null;
+    const path = this.stroke.end(view);
+    if (!path) return;
+    const value = this.stroke.erases ? null : this.value;
     this.app.do({ do: "paint", field: this.field, value, radius: this.radius, path });
   }
 
   draw(view, box) {
-    const ink = this.erases ? [1, 0.4, 0.4, 0.9] : [1, 1, 1, 0.9];
-    if (this.path && this.pathView === view) {
-      const [nx, ny] = view.shape;
-      const places = new Float32Array(this.path.flatMap(([x, y]) => [x / (nx - 1), y / (ny - 1)]));
-      view.drawing.strips("stroke", places, [this.path.length], box, ink);
-    }
-    if (this.over?.view === view) view.circle("brush", this.over.at, this.radius, box, ink);
+    this.stroke.draw(view, box, this.radius, this.stroke.erases ? [1, 0.4, 0.4, 0.9] : [1, 1, 1, 0.9]);
   }
 }

@@ -2,6 +2,10 @@
 // merged by a stroke across them, and split between two strokes.
 
 import { colorOf } from "./region_colors.js";
+import { Stroke, drawPath } from "./stroke.js";
+
+/** Places in a stroke: two of them are in the gesture that splits a part. */
+const MOST = 2000;
 
 const HANDS = ["paint", "merge", "split"];
 
@@ -15,6 +19,7 @@ export class Regions {
     this.region = 1;
     this.hand = "paint";
     this.brush = 0;
+    this.stroke = new Stroke(MOST);
     /** @type {number | null} the region whose cells alone are changed */
     this.only = null;
     this.hint = "Drag over parts to give them the region; Shift paints cells, Ctrl erases; m merges, s splits; [ and ] change the brush.";
@@ -54,28 +59,20 @@ export class Regions {
   }
 
   down(view, event) {
-    this.path = [view.toSamples(event.offsetX, event.offsetY)];
-    this.pathView = view;
-    this.erases = event.ctrlKey || event.metaKey;
+    this.stroke.begin(view, event);
     this.isOfCells = event.shiftKey;
     this.app.redraw();
   }
 
   move(view, event) {
-    this.over = { view, at: view.toSamples(event.offsetX, event.offsetY) };
-    if (this.path && view === this.pathView) {
-      const last = view.toPixels(this.path[this.path.length - 1]);
-      const apart = Math.hypot(last[0] - event.offsetX, last[1] - event.offsetY);
-      if (apart > 3 && this.path.length < 2000) this.path.push(this.over.at);
-    }
+    this.stroke.follow(view, event);
     this.app.redraw();
   }
 
   up(view) {
-    if (!this.path) return;
-    const path = this.path.map((s) => view.place(s));
+    const path = this.stroke.end(view);
+    if (!path) return;
     const { app, count } = this;
-    this.path = null;
     if (this.hand === "merge") {
       app.do({ do: "merge-parts", path, parts: count });
     } else if (this.hand === "split") {
@@ -83,7 +80,7 @@ export class Regions {
       else app.say("Now mark the other side.", true);
       this.first = this.first ? null : path;
     } else {
-      const region = this.erases ? 0 : this.region;
+      const region = this.stroke.erases ? 0 : this.region;
       app.do({ do: "region", region, radius: this.brush, path, parts: this.isOfCells ? null : count, over: this.only });
     }
     this.app.redraw();
@@ -91,16 +88,10 @@ export class Regions {
 
   draw(view, box) {
     const own = colorOf(this.region).map((c) => c / 255);
-    const ink = this.erases && this.path ? [1, 0.4, 0.4, 0.9] : this.hand === "paint" ? [...own, 1] : [1, 1, 1, 0.9];
-    if (this.path && this.pathView === view) this.drawPath(view, "stroke", this.path, box, ink);
-    if (this.first && this.app.dimension === 2) this.drawPath(view, "first", this.first, box, [1, 0.7, 0.3, 1]);
-    if (this.over?.view === view) view.circle("brush", this.over.at, this.brush, box, ink);
-  }
-
-  drawPath(view, name, path, box, ink) {
-    const [nx, ny] = view.shape;
-    const places = new Float32Array(path.flatMap(([x, y]) => [x / Math.max(1, nx - 1), y / Math.max(1, ny - 1)]));
-    view.drawing.strips(name, places, [path.length], box, ink);
+    const erases = this.stroke.erases && this.stroke.path;
+    const ink = erases ? [1, 0.4, 0.4, 0.9] : this.hand === "paint" ? [...own, 1] : [1, 1, 1, 0.9];
+    if (this.first && this.app.dimension === 2) drawPath(view, "first", this.first, box, [1, 0.7, 0.3, 1]);
+    this.stroke.draw(view, box, this.brush, ink);
   }
 
   /** The controls of the tool, for the panel. @param {(tag: string, properties?: object, ...children: any[]) => any} make */

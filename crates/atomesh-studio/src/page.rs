@@ -33,6 +33,7 @@ pub const ASSETS: &[Asset] = assets! {
     "region_colors.js": "text/javascript; charset=utf-8",
     "panel.js": "text/javascript; charset=utf-8",
     "playback.js": "text/javascript; charset=utf-8",
+    "stroke.js": "text/javascript; charset=utf-8",
     "tool_look.js": "text/javascript; charset=utf-8",
     "tool_paint.js": "text/javascript; charset=utf-8",
     "tool_atoms.js": "text/javascript; charset=utf-8",
