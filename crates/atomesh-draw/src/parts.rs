@@ -24,16 +24,15 @@ pub struct PartsPicture<'a, const D: usize> {
 impl<const D: usize> PartsPicture<'_, D> {
     /// The facets between two parts.
     fn borders(&self) -> Vec<u32> {
-        let is_border = |a: u32, b: u32| self.parts[a as usize] != self.parts[b as usize];
-        let borders: Vec<bool> = match self.cells {
-            FlowCells::Simplices(mesh) => (mesh.facets().iter())
-                .map(|facet| facet.neighbour.is_some_and(|other| is_border(facet.cell, other)))
-                .collect(),
-            FlowCells::Polytopes(mesh) => (mesh.owners().iter().zip(mesh.neighbours()))
-                .map(|(&owner, &neighbour)| is_border(owner, neighbour))
-                .collect(),
-        };
-        (0..borders.len() as u32).filter(|&facet| borders[facet as usize]).collect()
+        let (mut borders, mut facet) = (Vec::new(), 0);
+        let part = |cell: u32| self.parts[cell as usize];
+        self.cells.each_facet(|_, cell, beyond| {
+            if beyond.is_some_and(|beyond| part(cell) != part(beyond)) {
+                borders.push(facet);
+            }
+            facet += 1;
+        });
+        borders
     }
 
     fn flow<'a>(&'a self, borders: &'a [u32]) -> FlowPicture<'a, D> {

@@ -4,7 +4,7 @@
 //! the farthest to the nearest: first those beyond the horizontal slice, and on each side of it first those beyond the
 //! slice normal to x.
 
-use atomesh::geometry::Point;
+use atomesh::geometry::{Point, cross, difference, dot};
 use atomesh::image::Image;
 
 use crate::raster::Ramp;
@@ -83,6 +83,13 @@ impl Camera {
         std::array::from_fn(|k| (0..3).map(|axis| p[axis] * self.axes[axis][k]).sum())
     }
 
+    /// How far a facet faces the eye: 0 seen edge-on, or without an area, to 1 from the front.
+    pub fn facing(&self, [a, b, c]: &[Point<3>; 3]) -> f64 {
+        let normal = cross(&difference(b, a), &difference(c, a));
+        let size = dot(&normal, &normal).sqrt();
+        if size > 0.0 { dot(&normal, &self.away).abs() / size } else { 0.0 }
+    }
+
     /// How large a box of these sides is as it is seen, with its margins.
     pub fn seen(&self, sides: &Point<3>) -> Place {
         let (min, max) = self.outline(sides);
@@ -126,6 +133,21 @@ impl Fit {
     pub fn place(&self, seen: Place) -> Place {
         std::array::from_fn(|k| self.shift[k] + self.scale * seen[k])
     }
+}
+
+/// The edges of a box, four along each axis: the numbers of their ends, of which bit k says on which side of axis k a corner
+/// lies, and where these are.
+pub(crate) fn box_edges(
+    first: &Point<3>,
+    extent: &Point<3>,
+) -> impl Iterator<Item = ([usize; 2], [Point<3>; 2])> {
+    let (first, extent) = (*first, *extent);
+    let corner = move |at: usize| -> Point<3> {
+        std::array::from_fn(|k| first[k] + extent[k] * (at >> k & 1) as f64)
+    };
+    let along =
+        |k: usize| (0..8_usize).filter(move |at| at >> k & 1 == 0).map(move |at| [at, at | 1 << k]);
+    (0..3).flat_map(along).map(move |ends| (ends, ends.map(corner)))
 }
 
 struct View<'a> {

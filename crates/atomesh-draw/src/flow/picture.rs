@@ -1,6 +1,6 @@
 //! The contents of a picture of flow, and its style.
 
-use atomesh::geometry::Point;
+use atomesh::geometry::{Bounds, Point};
 use atomesh::image::Image;
 use atomesh::mesh::{Mesh, PolyMesh};
 
@@ -30,16 +30,39 @@ impl<const D: usize> FlowCells<'_, D> {
         }
     }
 
-    /// The facets' corners.
-    pub(super) fn facets(&self) -> Vec<Vec<u32>> {
-        match self {
-            Self::Simplices(mesh) => {
-                mesh.facets().iter().map(|facet| facet.corners.to_vec()).collect()
-            }
-            Self::Polytopes(mesh) => {
-                (0..mesh.face_count()).map(|face| mesh.face(face).to_vec()).collect()
+    /// The box of a picture: its least sample coordinates and its extent, those of the image or else of the mesh.
+    pub(crate) fn shown_box(&self, image: Option<&Image<D>>) -> (Point<D>, Point<D>) {
+        match image {
+            Some(image) => ([-0.5; D], image.frame().shape().map(|n| n as f64)),
+            None => {
+                let none = Bounds { min: [0.0; D], max: [1.0; D] };
+                let bounds = Bounds::of(self.points()).unwrap_or(none);
+                (bounds.min, bounds.extent().map(|x| x.max(f64::MIN_POSITIVE)))
             }
         }
+    }
+
+    /// Visits the facets in their order: their corners, their cell, and the cell beyond them if there is one.
+    pub(crate) fn each_facet(&self, mut visit: impl FnMut(&[u32], u32, Option<u32>)) {
+        match self {
+            Self::Simplices(mesh) => {
+                for facet in mesh.facets() {
+                    visit(&facet.corners, facet.cell, facet.neighbour);
+                }
+            }
+            Self::Polytopes(mesh) => {
+                for (face, &owner) in mesh.owners().iter().enumerate() {
+                    visit(mesh.face(face), owner, mesh.neighbours().get(face).copied());
+                }
+            }
+        }
+    }
+
+    /// The facets' corners.
+    pub(super) fn facets(&self) -> Vec<Vec<u32>> {
+        let mut facets = Vec::new();
+        self.each_facet(|corners, _, _| facets.push(corners.to_vec()));
+        facets
     }
 }
 

@@ -1,6 +1,6 @@
 //! What the panels of a picture of flow in space share: the box, where the slices meet, and the scale.
 
-use atomesh::geometry::{Bounds, Point, difference};
+use atomesh::geometry::{Point, difference};
 use atomesh::image::Image;
 
 use super::picture::{FlowCells, FlowPicture};
@@ -31,18 +31,10 @@ impl<'a> Scene<'a> {
         at: Option<Point<3>>,
         style: &'a Style,
     ) -> Result<Self, DrawError> {
-        let (first, extent, middle) = match flow.image {
-            Some(image) => {
-                let shape = image.frame().shape();
-                ([-0.5; 3], shape.map(|n| n as f64), shape.map(|n| (n / 2) as f64))
-            }
-            None => {
-                let none = Bounds { min: [0.0; 3], max: [1.0; 3] };
-                let bounds = Bounds::of(flow.cells.points()).unwrap_or(none);
-                let extent = bounds.extent().map(|x| x.max(f64::MIN_POSITIVE));
-                let middle = std::array::from_fn(|k| bounds.min[k] + 0.5 * extent[k]);
-                (bounds.min, extent, middle)
-            }
+        let (first, extent) = flow.cells.shown_box(flow.image);
+        let middle = match flow.image {
+            Some(image) => image.frame().shape().map(|n| (n / 2) as f64),
+            None => std::array::from_fn(|k| first[k] + 0.5 * extent[k]),
         };
         let at = at.unwrap_or(middle);
         for axis in 0..3 {

@@ -9,7 +9,7 @@ use super::scene::Scene;
 use crate::color_map::PLASMA;
 use crate::shape::{Place, Rect, Shape};
 use crate::style::Color;
-use crate::view::{BACKGROUND, Camera, Fit, OUTLINE, view};
+use crate::view::{BACKGROUND, Camera, Fit, OUTLINE, box_edges, view};
 
 /// The width of streamlines in pixels.
 const LINE: f64 = 1.6;
@@ -117,33 +117,19 @@ impl<'a> Eye<'a> {
 
     /// The grey of a facet, lighter the more it faces the eye.
     fn shade(&self, corners: &[Point<3>]) -> Color {
-        let [a, b, c] = [0, 1, 2].map(|i| self.in_box(&corners[i]));
-        let (u, v) = (difference(&b, &a), difference(&c, &a));
-        let normal: Point<3> = std::array::from_fn(|k| {
-            let (i, j) = ((k + 1) % 3, (k + 2) % 3);
-            u[i] * v[j] - u[j] * v[i]
-        });
-        let size = dot(&normal, &normal).sqrt();
-        let share = if size > 0.0 { dot(&normal, &self.camera.away).abs() / size } else { 0.0 };
+        let share = self.camera.facing(&[0, 1, 2].map(|i| self.in_box(&corners[i])));
         let [least, most] = BARRIER;
         [(least + share * (most - least)).round() as u8; 3]
     }
 
     /// The edges of the box: those behind its contents, and those in front.
     fn frame(&self) -> [Vec<[Place; 2]>; 2] {
-        let Scene { first, extent, .. } = self.scene;
-        let corner = |at: usize| -> Point<3> {
-            std::array::from_fn(|k| first[k] + extent[k] * (at >> k & 1) as f64)
-        };
         let nearest =
             (0..3).fold(0, |at, k| if self.camera.away[k] < 0.0 { at | 1 << k } else { at });
         let mut edges = [Vec::new(), Vec::new()];
-        for at in 0..8_usize {
-            for other in (0..3).map(|k| at | 1 << k).filter(|other| *other != at) {
-                let is_before = at == nearest || other == nearest;
-                let ends = [corner(at), corner(other)];
-                edges[usize::from(is_before)].push(ends.map(|p| self.place(&p)));
-            }
+        for (corners, ends) in box_edges(&self.scene.first, &self.scene.extent) {
+            let is_before = corners.contains(&nearest);
+            edges[usize::from(is_before)].push(ends.map(|p| self.place(&p)));
         }
         edges
     }

@@ -7,7 +7,7 @@ mod depth;
 mod names;
 mod solid;
 
-use atomesh::geometry::{Bounds, Point, difference, dot};
+use atomesh::geometry::{Point, difference, dot};
 use atomesh::image::Image;
 
 use crate::color_map::color_of_part;
@@ -17,7 +17,7 @@ use crate::picture::Picture;
 use crate::raster::Ramp;
 use crate::shape::{Place, Rect, Shape};
 use crate::style::{Color, Style};
-use crate::view::{BACKGROUND, BRIGHTNESS, Camera, Fit, OUTLINE};
+use crate::view::{BACKGROUND, BRIGHTNESS, Camera, Fit, OUTLINE, box_edges};
 use depth::{Corner, DepthCanvas, Outline};
 use solid::Solid;
 
@@ -128,14 +128,7 @@ struct Scene<'a> {
 
 impl<'a> Scene<'a> {
     fn new(contents: &'a SpacePicture<'a, 3>, style: &'a Style) -> Self {
-        let (first, extent) = match contents.image {
-            Some(image) => ([-0.5; 3], image.frame().shape().map(|n| n as f64)),
-            None => {
-                let none = Bounds { min: [0.0; 3], max: [1.0; 3] };
-                let bounds = Bounds::of(contents.cells.points()).unwrap_or(none);
-                (bounds.min, bounds.extent().map(|x| x.max(f64::MIN_POSITIVE)))
-            }
-        };
+        let (first, extent) = contents.cells.shown_box(contents.image);
         let step = contents.image.map_or([1.0; 3], |i| i.frame().grid(style.units).step);
         let camera = Camera::new(style.z_up);
         let sides = std::array::from_fn(|k| extent[k] * step[k]);
@@ -171,14 +164,7 @@ impl<'a> Scene<'a> {
 
     /// The light on a facet, from [`AMBIENT`] seen edge-on to 1 from the front.
     fn light(&self, corners: &[Point<3>; 3]) -> f64 {
-        let [a, b, c] = corners.each_ref().map(|p| self.in_box(p));
-        let (u, v) = (difference(&b, &a), difference(&c, &a));
-        let normal: Point<3> = std::array::from_fn(|k| {
-            let (i, j) = ((k + 1) % 3, (k + 2) % 3);
-            u[i] * v[j] - u[j] * v[i]
-        });
-        let size = dot(&normal, &normal).sqrt();
-        let facing = if size > 0.0 { dot(&normal, &self.camera.away).abs() / size } else { 0.0 };
+        let facing = self.camera.facing(&corners.each_ref().map(|p| self.in_box(p)));
         AMBIENT + (1.0 - AMBIENT) * facing
     }
 
@@ -241,20 +227,9 @@ impl<'a> Scene<'a> {
 
     /// The edges of the box, where nothing hides them.
     fn frame(&self, canvas: &mut DepthCanvas) {
-        for ends in self.edges() {
+        for (_, ends) in box_edges(&self.first, &self.extent) {
             canvas.line(ends.map(|p| self.seen(&p)), 1.0, OUTLINE);
         }
-    }
-
-    /// The edges of the box, four along each axis.
-    fn edges(&self) -> impl Iterator<Item = [Point<3>; 2]> {
-        let corner = |at: usize| -> Point<3> {
-            std::array::from_fn(|k| self.first[k] + self.extent[k] * (at >> k & 1) as f64)
-        };
-        let along = move |k: usize| {
-            (0..8_usize).filter(move |at| at >> k & 1 == 0).map(move |at| [at, at | 1 << k])
-        };
-        (0..3).flat_map(along).map(move |ends| ends.map(corner))
     }
 }
 

@@ -1,9 +1,12 @@
 //! The names of axes and of surfaces in a picture in space.
 
+use atomesh::geometry::Point;
+
 use super::Scene;
 use crate::label::lettering;
 use crate::shape::{Place, Rect, Shape};
 use crate::style::Color;
+use crate::view::box_edges;
 
 /// The height of letters, the width of their strokes, and their colour.
 const LETTER: f64 = 12.0;
@@ -20,8 +23,12 @@ const MARGIN: f64 = 12.0;
 /// X, Y and Z, each outside the middle of the lowest edge of the box along its axis.
 pub(super) fn of_axes(scene: &Scene<'_>) -> Shape {
     let middle: Place = scene.size.map(|side| 0.5 * side);
-    let ends: Vec<[Place; 2]> =
-        scene.edges().map(|ends| ends.map(|p| scene.seen(&p)).map(|[x, y, _]| [x, y])).collect();
+    let seen = |p: Point<3>| {
+        let [x, y, _] = scene.seen(&p);
+        [x, y]
+    };
+    let ends = box_edges(&scene.first, &scene.extent);
+    let ends: Vec<[Place; 2]> = ends.map(|(_, ends)| ends.map(seen)).collect();
     let mut lines = Vec::new();
     for (axis, name) in ["X", "Y", "Z"].into_iter().enumerate() {
         let edges = &ends[4 * axis..4 * axis + 4];

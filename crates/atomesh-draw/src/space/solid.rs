@@ -38,23 +38,11 @@ impl<'a> Solid<'a> {
     }
 
     pub fn paint(&self, canvas: &mut DepthCanvas) {
-        match self.scene.contents.cells {
-            FlowCells::Simplices(mesh) => {
-                for facet in mesh.facets() {
-                    if let Some(cell) = self.shown(facet.cell, facet.neighbour) {
-                        self.facet(&facet.corners, cell, canvas);
-                    }
-                }
+        self.scene.contents.cells.each_facet(|corners, cell, beyond| {
+            if let Some(cell) = self.shown(cell, beyond) {
+                self.facet(corners, cell, canvas);
             }
-            FlowCells::Polytopes(mesh) => {
-                for face in 0..mesh.face_count() {
-                    let neighbour = mesh.neighbours().get(face).copied();
-                    if let Some(cell) = self.shown(mesh.owners()[face], neighbour) {
-                        self.facet(mesh.face(face), cell, canvas);
-                    }
-                }
-            }
-        }
+        });
     }
 
     /// The cell of which a facet is seen: the one that is left on one side alone.

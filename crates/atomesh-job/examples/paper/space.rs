@@ -2,7 +2,7 @@
 
 use std::collections::HashMap;
 
-use atomesh::geometry::{Point, difference};
+use atomesh::geometry::{Point, Sets, cross, difference};
 use atomesh::image::Image;
 use atomesh::mesh::{FacetGroup, Mesh, is_feature_name};
 use atomesh::run::Outcome;
@@ -91,33 +91,22 @@ fn areas_by_axis(mesh: &Mesh<3>, group: &FacetGroup<3>) -> Point<3> {
     let mut sum = [0.0; 3];
     for facet in &group.facets {
         let [a, b, c] = facet.map(|corner| mesh.points()[corner as usize]);
-        let (u, v) = (difference(&b, &a), difference(&c, &a));
-        for k in 0..3 {
-            let (i, j) = ((k + 1) % 3, (k + 2) % 3);
-            sum[k] += 0.5 * (u[i] * v[j] - u[j] * v[i]).abs();
-        }
+        let normal = cross(&difference(&b, &a), &difference(&c, &a));
+        (0..3).for_each(|k| sum[k] += 0.5 * normal[k].abs());
     }
     sum
 }
 
 /// The number of pieces that a surface falls into, joined along edges.
 fn pieces(sheet: &Sheet<3>) -> usize {
-    let mut of_edges: HashMap<[u32; 2], usize> = HashMap::new();
-    let mut joined: Vec<usize> = (0..sheet.facets.len()).collect();
-    let root = |joined: &[usize], mut at: usize| {
-        while joined[at] != at {
-            at = joined[at];
-        }
-        at
-    };
-    for (at, facet) in sheet.facets.iter().enumerate() {
+    let mut of_edges: HashMap<[u32; 2], u32> = HashMap::new();
+    let mut sets = Sets::new(sheet.facets.len());
+    for (at, facet) in (0..).zip(&sheet.facets) {
         for k in 0..3 {
             let mut edge = [facet[k], facet[(k + 1) % 3]];
             edge.sort_unstable();
-            let other = *of_edges.entry(edge).or_insert(at);
-            let (a, b) = (root(&joined, at), root(&joined, other));
-            joined[a.max(b)] = a.min(b);
+            sets.join(at, *of_edges.entry(edge).or_insert(at));
         }
     }
-    joined.iter().enumerate().filter(|(at, own)| at == *own).count()
+    sets.numbers().into_iter().max().map_or(0, |last| last as usize + 1)
 }

@@ -45,7 +45,7 @@ pub fn dot<const D: usize>(a: &Point<D>, b: &Point<D>) -> f64 {
 
 /// The vector product.
 #[inline(always)]
-pub(crate) fn cross(a: &Point<3>, b: &Point<3>) -> Point<3> {
+pub fn cross(a: &Point<3>, b: &Point<3>) -> Point<3> {
     [a[1] * b[2] - a[2] * b[1], a[2] * b[0] - a[0] * b[2], a[0] * b[1] - a[1] * b[0]]
 }
 

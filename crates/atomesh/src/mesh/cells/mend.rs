@@ -156,7 +156,7 @@ impl<const D: usize> Cells<D> {
     fn beyond_reach(&self, filling: &Filling<D>, rim: &Rim<D>, places: &Places<'_, D>) -> Vec<u32> {
         // the corner of the filling opposite each facet of the rim
         let mut opposite: HashMap<[u32; D], u32> = HashMap::new();
-        for cell in (0..filling.inside.len() as u32).filter(|&cell| filling.inside[cell as usize]) {
+        for cell in filling.cells_inside() {
             for off in 0..=D {
                 let (facet, odd) = filling.facet(cell, off);
                 if rim.get(&facet).is_some_and(|rim| rim.odd == odd) {
@@ -182,7 +182,7 @@ impl<const D: usize> Filling<D> {
     /// Whether each of its atoms is a corner of a cell in the hole.
     fn has_all_atoms(&self) -> bool {
         let mut is_corner = vec![false; self.atoms.len()];
-        for cell in (0..self.inside.len() as u32).filter(|&cell| self.inside[cell as usize]) {
+        for cell in self.cells_inside() {
             for &corner in self.cells.corners(cell) {
                 is_corner[corner as usize] = true;
             }

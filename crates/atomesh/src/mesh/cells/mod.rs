@@ -386,10 +386,15 @@ impl<const D: usize> Filling<D> {
         sorted(facet.map(|corner| self.atoms[corner as usize]))
     }
 
+    /// The cells that lie in the hole.
+    fn cells_inside(&self) -> impl Iterator<Item = u32> {
+        (0..self.inside.len() as u32).filter(|&cell| self.inside[cell as usize])
+    }
+
     /// The corners of the cells in the hole, as atoms.
     fn added(&self) -> Vec<u32> {
-        let cells = self.cells.all().zip(&self.inside).filter(|(_, inside)| **inside);
-        cells.flat_map(|(corners, _)| corners).map(|&corner| self.atoms[corner as usize]).collect()
+        let corners = self.cells_inside().flat_map(|cell| self.cells.corners(cell));
+        corners.map(|&corner| self.atoms[corner as usize]).collect()
     }
 }
 
